@@ -1,0 +1,1 @@
+//! The numerical core of impasto: numbers in, numbers out.

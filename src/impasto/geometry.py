@@ -1,0 +1,189 @@
+"""Directions, lights and cameras in the painting's frame.
+
+The frame is right-handed and fixed to the painting: origin at the centre of the image, X to the right (along
+the arm's sweep), Y up the painting, Z along its normal towards the viewer. Directions are unit vectors that
+point away from the surface. See docs/notation.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def arm_direction(angle: ArrayLike) -> Array:
+    """Return the light direction for an angle of the arm, which sweeps the XZ plane.
+
+    Parameters
+    ----------
+    angle : float or ndarray of shape (...)
+        Signed arm angle θa in radians, 0 along the painting's normal, positive towards +X.
+
+    Returns
+    -------
+    ndarray of shape (..., 3)
+        Unit vectors l = (sin θa, 0, cos θa) [Chen2007]_, Fig. 2.
+    """
+    angle = np.asarray(angle, dtype=np.float64)
+    return np.stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)], axis=-1)
+
+
+def dome_direction(zenith: ArrayLike, azimuth: ArrayLike) -> Array:
+    """Return unit vectors for zenith and azimuth angles.
+
+    Parameters
+    ----------
+    zenith, azimuth : float or ndarray, broadcastable
+        Radians; zenith from +Z, azimuth from +X towards +Y.
+
+    Returns
+    -------
+    ndarray of shape (..., 3)
+    """
+    zenith, azimuth = np.broadcast_arrays(
+        np.asarray(zenith, dtype=np.float64), np.asarray(azimuth, dtype=np.float64)
+    )
+    return np.stack(
+        [np.sin(zenith) * np.cos(azimuth), np.sin(zenith) * np.sin(azimuth), np.cos(zenith)], axis=-1
+    )
+
+
+def zenith_azimuth(direction: ArrayLike) -> tuple[Array, Array]:
+    """Return zenith and azimuth in radians of directions of shape (..., 3), the inverse of `dome_direction`."""
+    x, y, z = np.moveaxis(np.asarray(direction, dtype=np.float64), -1, 0)
+    return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
+
+
+def tilt_direction(theta: ArrayLike, phi: ArrayLike) -> Array:
+    """Return unit vectors for the paper's signed tilts θ (in the arm's plane) and φ (out of it).
+
+    Parameters
+    ----------
+    theta, phi : float or ndarray, broadcastable
+        Radians.
+
+    Returns
+    -------
+    ndarray of shape (..., 3)
+        (cos φ sin θ, sin φ, cos φ cos θ), the form of n and v in [Chen2007]_, Fig. 2.
+    """
+    theta, phi = np.broadcast_arrays(np.asarray(theta, np.float64), np.asarray(phi, np.float64))
+    return np.stack([np.cos(phi) * np.sin(theta), np.sin(phi), np.cos(phi) * np.cos(theta)], axis=-1)
+
+
+def direction_tilts(direction: ArrayLike) -> tuple[Array, Array]:
+    """Return the tilts (θ, φ) in radians of unit vectors of shape (..., 3), the inverse of `tilt_direction`."""
+    x, y, z = np.moveaxis(np.asarray(direction, dtype=np.float64), -1, 0)
+    return np.arctan2(x, z), np.arcsin(np.clip(y, -1.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Lights:
+    """The lights of a capture, one per photograph.
+
+    Parameters
+    ----------
+    names : tuple of str
+        One name per light: the photograph's file name without its ending, or the light's number.
+    direction : ndarray of shape (L, 3), float64
+        Unit vectors from the centre of the painting towards each light.
+    position_mm : ndarray of shape (L, 3), float64
+        Positions in the painting's frame; NaN where the light is treated as infinitely far away.
+    intensity : ndarray of shape (L, C), float64
+        Relative irradiance at the centre of the painting on a surface that faces the light, per channel;
+        C is 1 where the channels share it.
+    angular_size_deg : ndarray of shape (L,), float64
+        Angular diameter of the source seen from the painting; NaN where unknown.
+    """
+
+    names: tuple[str, ...]
+    direction: Array
+    position_mm: Array = field(default=None)  # type: ignore[assignment]
+    intensity: Array = field(default=None)  # type: ignore[assignment]
+    angular_size_deg: Array = field(default=None)  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        defaults = {
+            "direction": self.direction,
+            "position_mm": np.full((count, 3), np.nan) if self.position_mm is None else self.position_mm,
+            "intensity": np.ones((count, 1)) if self.intensity is None else self.intensity,
+            "angular_size_deg": np.full(count, np.nan)
+            if self.angular_size_deg is None
+            else self.angular_size_deg,
+        }
+        for name, value in defaults.items():
+            object.__setattr__(self, name, np.ascontiguousarray(value, dtype=np.float64))
+        object.__setattr__(self, "names", tuple(self.names))
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def near(self) -> bool:
+        """Whether any light stands at a finite distance."""
+        return bool(np.isfinite(self.position_mm).any())
+
+    def select(self, index: ArrayLike) -> Lights:
+        """Return the lights at `index` (integers, a slice or a boolean mask), in that order."""
+        rows = np.arange(len(self))[index]
+        return Lights(
+            names=tuple(self.names[row] for row in rows),
+            direction=self.direction[rows],
+            position_mm=self.position_mm[rows],
+            intensity=self.intensity[rows],
+            angular_size_deg=self.angular_size_deg[rows],
+        )
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Where the camera stands.
+
+    Parameters
+    ----------
+    view_direction : ndarray of shape (3,), float64
+        Unit vector from the centre of the painting towards the camera.
+    distance_mm : float or None
+        Distance of the camera from the centre; None for an orthographic camera.
+    mm_per_px : float or None
+        Size of a pixel on the painting; needed where a light or the camera is at a finite distance.
+    """
+
+    view_direction: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    distance_mm: float | None = None
+    mm_per_px: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self, "view_direction", np.ascontiguousarray(self.view_direction, dtype=np.float64)
+        )
+
+
+def pixel_position_mm(
+    rows: slice, columns: slice, height: int, width: int, mm_per_px: float
+) -> NDArray[np.float32]:
+    """Return where the pixels of a tile lie on the painting.
+
+    Parameters
+    ----------
+    rows, columns : slice
+        The tile, with start and stop.
+    height, width : int
+        Size of the whole image in pixels.
+    mm_per_px : float
+        Size of a pixel on the painting.
+
+    Returns
+    -------
+    ndarray of shape (rows * columns, 2), float32
+        X and Y in mm of each pixel's centre, rows first; row 0 is the top of the painting.
+    """
+    x = (np.arange(columns.start, columns.stop) - (width - 1) / 2) * mm_per_px
+    y = -(np.arange(rows.start, rows.stop) - (height - 1) / 2) * mm_per_px
+    grid_y, grid_x = np.meshgrid(y, x, indexing="ij")
+    return np.stack([grid_x.ravel(), grid_y.ravel()], axis=-1).astype(np.float32)
