@@ -1,0 +1,1 @@
+"""Measure how a painted surface reflects light, and show it under any light."""
