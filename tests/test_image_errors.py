@@ -13,9 +13,7 @@ def gathered(photograph, rendering, clipped=None, bands=(0, 5, 6, 30, 64)):
     accumulator = ErrorAccumulator(*photograph.shape)
     for start, stop in zip(bands, bands[1:], strict=False):
         rows = slice(start, stop)
-        accumulator.add(
-            photograph[rows], rendering[rows], photograph[rows], rendering[rows], clipped[rows]
-        )
+        accumulator.add(photograph[rows], rendering[rows], photograph[rows], rendering[rows], clipped[rows])
     return accumulator.result()
 
 
