@@ -13,8 +13,8 @@ from impasto.geometry import Lights, zenith_azimuth
 def spread_lights(lights: Lights, count: int) -> list[int]:
     """Choose lights to hold out, spread in elevation.
 
-    The lights are ordered by their zenith angle and cut into `count` groups of equal size; the middle one of
-    each group is chosen. So the choice is the same each time, covers low and high lights, and, where the groups
+    The lights are ordered by their zenith angle and cut into `count` groups of equal size, and the middle of
+    each is chosen. So the choice is the same each time, covers low and high lights, and, where the groups
     have three lights or more, leaves the lowest and the highest to the fit.
 
     Parameters
