@@ -58,6 +58,10 @@ class OptionError(ImpastoError):
     """An option or argument that does not exist or does not fit the data."""
 
 
+class OutputError(ImpastoError):
+    """Pictures and pages that cannot be written."""
+
+
 def raise_problems(error: type[ImpastoError], problems: Iterable[Problem]) -> None:
     """Raise `error` with all `problems`, or return when there are none.
 
