@@ -1,0 +1,229 @@
+"""Write pictures in bands of rows as they are computed, so that no whole picture has to be in memory.
+
+A file is written under a temporary name and renamed when its last row is in it. `impasto.images` writes
+pictures that are in memory anyway.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from os import PathLike
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impasto.colour import quantise
+from impasto.errors import OutputError, Problem
+from impasto.images import profile
+
+_TIFF_STRIP_ROWS = 64
+
+
+class BandWriter:
+    """Write an EXR or a PNG file from bands of rows, top to bottom.
+
+    The type of the samples follows from the file's ending: .exr holds float32 as given; .png holds 8 bits of
+    sRGB, with an ICC profile, from values that are encoded already (0 to 1).
+
+    Parameters
+    ----------
+    path : path
+        The file, which is there when the writer closes without an exception.
+    height, width : int
+        Size of the picture.
+    channels : sequence of str
+        Their names: ``("R", "G", "B")``, or one.
+    description : str, optional
+        What the picture shows; kept in the file.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        height: int,
+        width: int,
+        channels: Sequence[str],
+        description: str = "",
+    ) -> None:
+        import OpenImageIO as oiio
+
+        self.path = Path(path)
+        self._height = height
+        self._row = 0
+        self._display = self.path.suffix.lower() == ".png"
+        spec = oiio.ImageSpec(width, height, len(channels), "uint8" if self._display else "float")
+        spec.channelnames = tuple(channels)
+        spec.attribute("Software", "impasto")
+        if description:
+            spec.attribute("ImageDescription", description)
+        if self._display:
+            data = profile("srgb", grey=len(channels) == 1)
+            spec.attribute("ICCProfile", f"uint8[{len(data)}]", np.frombuffer(data, np.uint8))
+        else:
+            spec.attribute("compression", "zip")
+            spec.attribute("DateTime", "")
+        self._temporary = _temporary(self.path)
+        output: Any = oiio.ImageOutput.create(self.path.suffix[1:].lower())
+        self._output = output
+        if not self._output.open(str(self._temporary), spec):
+            self._temporary.unlink(missing_ok=True)
+            raise self._failed()
+
+    def write(self, band: NDArray[np.floating]) -> None:
+        """Write the next rows.
+
+        Parameters
+        ----------
+        band : ndarray of shape (rows, W, C), float32
+            Linear values for EXR, sRGB values from 0 to 1 for PNG.
+
+        Raises
+        ------
+        OutputError
+            If the disk refuses them.
+        """
+        stop = self._row + band.shape[0]
+        pixels = quantise(band) if self._display else np.ascontiguousarray(band, dtype=np.float32)
+        if not self._output.write_scanlines(self._row, stop, 0, pixels):
+            raise self._failed()
+        self._row = stop
+
+    def __enter__(self) -> BandWriter:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        closed = self._output.close()
+        if kind is not None:
+            self._temporary.unlink(missing_ok=True)
+            return
+        if not closed or self._row != self._height:
+            reason = self._failed()
+            self._temporary.unlink(missing_ok=True)
+            raise reason
+        self._temporary.replace(self.path)
+
+    def _failed(self) -> OutputError:
+        reason = self._output.geterror().strip().split("\n")[0]
+        return output_error(self.path, reason or f"row {self._row} of {self._height}")
+
+
+def write_tiff_bands(
+    path: str | PathLike[str],
+    bands: Iterable[NDArray[Any]],
+    shape: tuple[int, int, int],
+    dtype: Any,
+    *,
+    description: str = "",
+    srgb: bool = False,
+) -> None:
+    """Write a TIFF file of unsigned integers from bands of rows.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    bands : iterable of ndarray of shape (rows, W, C)
+        The rows, top to bottom, of `dtype`.
+    shape : (H, W, C)
+        Size of the whole picture; C is 1 or 3.
+    dtype : dtype
+        uint8 or uint16.
+    description : str, optional
+        What the codes mean; kept in the file.
+    srgb : bool, optional
+        Whether the codes are sRGB, which adds the ICC profile.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    import tifffile
+
+    path = Path(path)
+    height, width, channels = shape
+    temporary = _temporary(path)
+    try:
+        tifffile.imwrite(
+            temporary,
+            data=_strips(bands),
+            shape=(height, width, channels) if channels > 1 else (height, width),
+            dtype=np.dtype(dtype),
+            photometric="rgb" if channels == 3 else "minisblack",
+            compression="zlib",
+            predictor=True,
+            rowsperstrip=_TIFF_STRIP_ROWS,
+            description=description or None,
+            software="impasto",
+            metadata=None,
+            iccprofile=profile("srgb", grey=channels == 1) if srgb else None,
+            bigtiff=height * width * channels * np.dtype(dtype).itemsize > 3 << 30,
+        )
+        temporary.replace(path)
+    except OSError as error:
+        raise output_error(path, error.strerror or str(error)) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _strips(bands: Iterable[NDArray[Any]]) -> Iterator[bytes]:
+    """Cut bands into the compressed strips of a TIFF file, joining what is left of one with the next."""
+    import imagecodecs
+
+    def compressed(strip: NDArray[Any]) -> bytes:
+        return bytes(imagecodecs.zlib_encode(imagecodecs.delta_encode(strip, axis=1).tobytes()))
+
+    rest: NDArray[Any] | None = None
+    for band in bands:
+        joined = band if rest is None or not len(rest) else np.concatenate([rest, band])
+        whole = len(joined) // _TIFF_STRIP_ROWS * _TIFF_STRIP_ROWS
+        for start in range(0, whole, _TIFF_STRIP_ROWS):
+            yield compressed(joined[start : start + _TIFF_STRIP_ROWS])
+        rest = joined[whole:]
+    if rest is not None and len(rest):
+        yield compressed(rest)
+
+
+def prepare_folder(out: str | PathLike[str]) -> Path:
+    """Make the folder `out` if it is not there, and return it.
+
+    Raises
+    ------
+    OutputError
+        If it is a file or cannot be made.
+    """
+    folder = Path(out)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:
+        raise OutputError(
+            Problem(str(folder), "is a file, and a folder is needed", "Choose another folder")
+        ) from error
+    except OSError as error:
+        raise output_error(folder, error.strerror or str(error)) from error
+    return folder
+
+
+def _temporary(path: Path) -> Path:
+    return path.with_name(f".{path.name}.partial")
+
+
+def output_error(path: Path, reason: str) -> OutputError:
+    """Return the error for a file that cannot be written."""
+    return OutputError(
+        Problem(
+            where=str(path),
+            what=f"cannot be written: {reason}",
+            do="Make room or choose another folder, then run the same command again",
+        )
+    )
