@@ -1,0 +1,206 @@
+"""Write pictures: PNG, TIFF and EXR files, with an ICC profile where the format has room for one.
+
+Each file is written under a temporary name and renamed when it is whole. Colours are given sRGB's primaries
+until a camera's own are calibrated.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impasto.colour import decode_srgb
+from impasto.errors import OutputError, Problem
+
+ProfileName = Literal["srgb", "linear"]
+
+# An ICC profile says when it was made; a fixed date keeps equal pictures equal byte for byte.
+_PROFILE_DATE = np.array([2000, 1, 1, 0, 0, 0], dtype=">u2").tobytes()
+# CIE xy of sRGB's white and of its red, green and blue primaries [IEC61966-2-1]_.
+_WHITE = (0.3127, 0.3290)
+_PRIMARIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06)
+_CHANNEL_NAMES = {1: ("Y",), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
+
+
+@cache
+def profile(name: ProfileName, grey: bool = False) -> bytes:
+    """Return an ICC profile with sRGB's primaries and white.
+
+    Parameters
+    ----------
+    name : {'srgb', 'linear'}
+        The tone curve: sRGB's, or a straight line.
+    grey : bool
+        Whether the profile is for pictures of one channel.
+    """
+    import imagecodecs
+
+    if grey:
+        curve = None if name == "linear" else _srgb_curve()
+        made = imagecodecs.cms_profile("gray", gamma=1.0 if curve is None else None, transferfunction=curve)
+    elif name == "srgb":
+        made = imagecodecs.cms_profile("srgb")
+    else:
+        made = imagecodecs.cms_profile("rgb", whitepoint=_WHITE, primaries=_PRIMARIES, gamma=1.0)
+    return bytes(made[:24] + _PROFILE_DATE + made[36:])
+
+
+def _srgb_curve() -> NDArray[np.uint16]:
+    return np.rint(decode_srgb(np.linspace(0, 1, 4096)) * 65535).astype(np.uint16)
+
+
+def write_png(
+    path: str | os.PathLike[str], image: NDArray[Any], profile_name: ProfileName | None = "srgb"
+) -> None:
+    """Write a PNG file of 8 or 16 bits.
+
+    Parameters
+    ----------
+    path : path
+    image : ndarray of shape (H, W) or (H, W, 1 or 3), uint8 or uint16
+        Codes as they are to stand in the file; `impasto.colour.quantise` makes them from an `image_srgb`.
+    profile_name : {'srgb', 'linear'} or None
+        Profile to embed; None for data that are not colours.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    image = _checked(image, (np.uint8, np.uint16))
+    attributes: dict[str, Any] = {"png:compressionLevel": 4}
+    _write_with_oiio(path, image, "png", str(image.dtype), None, profile_name, attributes)
+
+
+def write_exr(
+    path: str | os.PathLike[str],
+    image: NDArray[np.floating],
+    *,
+    half: bool = False,
+    channel_names: Sequence[str] | None = None,
+) -> None:
+    """Write an OpenEXR file of linear values, losslessly compressed.
+
+    Parameters
+    ----------
+    path : path
+    image : ndarray of shape (H, W) or (H, W, C), float
+        Relative radiance, or any map; NaN stays NaN.
+    half : bool
+        Whether to store 16-bit floats (11 significant bits, up to 65504) instead of 32-bit ones.
+    channel_names : sequence of str, optional
+        By default Y, or R, G, B, by the number of channels.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    image = _checked(image, (np.float16, np.float32, np.float64)).astype(np.float32, copy=False)
+    kind = "half" if half else "float"
+    _write_with_oiio(
+        path, image, "openexr", kind, channel_names, None, {"compression": "zip", "DateTime": ""}
+    )
+
+
+def write_tiff(
+    path: str | os.PathLike[str], image: NDArray[Any], profile_name: ProfileName | None = None
+) -> None:
+    """Write a TIFF file of 8 or 16 bits or of 32-bit floats, deflated with a predictor.
+
+    Parameters
+    ----------
+    path : path
+    image : ndarray of shape (H, W) or (H, W, 1 or 3), uint8, uint16 or float32
+    profile_name : {'srgb', 'linear'}, optional
+        Profile to embed; None for data that are not colours.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    import tifffile
+
+    image = _checked(image, (np.uint8, np.uint16, np.float32))
+    grey = image.shape[2] == 1
+    with _written_whole(Path(path)) as temporary:
+        tifffile.imwrite(
+            temporary,
+            image[..., 0] if grey else image,
+            photometric="minisblack" if grey else "rgb",
+            compression="zlib",
+            predictor=True,
+            iccprofile=None if profile_name is None else profile(profile_name, grey),
+            metadata=None,
+            software="impasto",
+        )
+
+
+def _checked(image: NDArray[Any], dtypes: Sequence[type]) -> NDArray[Any]:
+    """Return the image with three axes, contiguous; raise for a shape or type that the format cannot hold."""
+    image = np.ascontiguousarray(image[..., None] if image.ndim == 2 else image)
+    if image.ndim != 3 or 0 in image.shape or image.dtype not in dtypes:
+        allowed = ", ".join(np.dtype(dtype).name for dtype in dtypes)
+        raise ValueError(
+            f"an image of shape {image.shape} and type {image.dtype} cannot be written; expected (H, W) or "
+            f"(H, W, C) of {allowed}"
+        )
+    return image
+
+
+def _write_with_oiio(
+    path: str | os.PathLike[str],
+    image: NDArray[Any],
+    format_name: str,
+    kind: str,
+    channel_names: Sequence[str] | None,
+    profile_name: ProfileName | None,
+    attributes: dict[str, Any],
+) -> None:
+    import OpenImageIO as oiio
+
+    height, width, channels = image.shape
+    names = channel_names or _CHANNEL_NAMES.get(channels)
+    if names is None or len(names) != channels:
+        raise ValueError(f"{channels} channels need as many names, got {names}")
+    spec = oiio.ImageSpec(width, height, channels, kind)
+    spec.channelnames = tuple(names)
+    for key, value in attributes.items():
+        spec.attribute(key, value)
+    if profile_name is not None:
+        data = profile(profile_name, channels == 1)
+        spec.attribute("ICCProfile", f"uint8[{len(data)}]", np.frombuffer(data, np.uint8))
+    with _written_whole(Path(path)) as temporary:
+        output = oiio.ImageOutput.create(format_name)
+        assert output is not None  # both formats are built into OpenImageIO
+        # A full disk may show only when the last rows are flushed, so closing is checked too.
+        whole = output.open(str(temporary), spec) and output.write_image(image)
+        if not (output.close() and whole):
+            raise OSError(output.geterror() or "no reason given")
+
+
+@contextmanager
+def _written_whole(path: Path) -> Iterator[Path]:
+    """Give a temporary name beside `path`; rename it when the block ends well, remove it when it does not."""
+    temporary = path.with_name(f".{path.name}.partial")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    except OSError as error:
+        raise OutputError(
+            Problem(
+                str(path),
+                f"cannot be written: {error.strerror or error}",
+                "Check that the folder exists, may be written to, and has room",
+            )
+        ) from error
+    finally:
+        temporary.unlink(missing_ok=True)
