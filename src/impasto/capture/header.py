@@ -51,7 +51,7 @@ class UnreadableError(Exception):
     """An image file that cannot be read; `what` and `do` are the parts of the `Problem` that it becomes."""
 
     def __init__(
-        self, what: str, do: str = "Copy it again from the camera, or leave it out by its name"
+        self, what: str, do: str = "Copy it again from the camera, or leave it out with --exclude"
     ) -> None:
         super().__init__(what)
         self.what = what

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from OpenImageIO import ImageInput, ImageSpec
 
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
 # Scan lines that OpenEXR compresses together; other compressions work line by line.
 _EXR_BLOCK_ROWS = {"zip": 16, "pxr24": 16, "piz": 32, "b44": 32, "b44a": 32, "dwaa": 32, "dwab": 256}
 # Bytes at the end of a JPEG file in which its end marker is looked for; cameras may append a little.
@@ -226,9 +227,10 @@ def _check_jpeg_end(path: Path) -> None:
 
 
 def _png_declared_transfer(path: Path) -> str | None:
-    """Walk the chunks of a PNG file; return what its sRGB or gAMA chunk states.
+    """Return what the sRGB or gAMA chunk of a PNG file states; raise if the file has no end.
 
-    OpenImageIO calls every PNG sRGB, whether the file says so or not.
+    OpenImageIO calls every PNG sRGB, whether the file says so or not. Both chunks come before the pixels,
+    whose thousands of chunks are walked only where the file does not end as it should.
     """
     declared = None
     with path.open("rb") as file:
@@ -240,7 +242,7 @@ def _png_declared_transfer(path: Path) -> str | None:
             if len(start) < 8:
                 raise UnreadableError("is cut off: the end chunk IEND is missing")
             length, kind = struct.unpack(">I4s", start)
-            if kind == b"IEND":
+            if kind == b"IEND" or (kind == b"IDAT" and _ends_with_iend(path, size)):
                 return declared
             if file.tell() + length + 4 > size:
                 raise UnreadableError(f"is cut off in its chunk {kind.decode('latin-1')}")
@@ -251,6 +253,12 @@ def _png_declared_transfer(path: Path) -> str | None:
                 declared = _gamma_name(stored)
                 length = 0
             file.seek(length + 4, 1)
+
+
+def _ends_with_iend(path: Path, size: int) -> bool:
+    with path.open("rb") as file:
+        file.seek(max(0, size - len(_PNG_END)))
+        return file.read() == _PNG_END
 
 
 def _gamma_name(stored: int) -> str | None:
