@@ -81,6 +81,16 @@ def test_colour_engines_accept_the_profiles():
     np.testing.assert_allclose(moved, red, atol=50)  # the same primaries, to 1e-3
 
 
+@pytest.mark.parametrize(("name", "half"), [("srgb", 0.5), ("linear", 0.7354)])
+def test_grey_profiles_are_neutral(name, half):
+    grey = np.array([[0, 32768, 65535]], np.uint16)
+    shown = imagecodecs.cms_transform(
+        grey, profile(name, grey=True), profile("srgb"), colorspace="gray", outcolorspace="rgb"
+    )
+    expected = np.array([0, half, 1])[:, None] * [1, 1, 1]
+    np.testing.assert_allclose(shown[0] / 65535, expected, atol=2e-3)
+
+
 @pytest.mark.parametrize("writer", [write_png, write_tiff, write_exr])
 def test_equal_pictures_are_equal_files(tmp_path, writer):
     image = np.zeros((8, 8, 3), np.float32 if writer is write_exr else np.uint16)

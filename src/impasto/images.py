@@ -26,6 +26,7 @@ _PROFILE_DATE = np.array([2000, 1, 1, 0, 0, 0], dtype=">u2").tobytes()
 # CIE xy of sRGB's white and of its red, green and blue primaries [IEC61966-2-1]_.
 _WHITE = (0.3127, 0.3290)
 _PRIMARIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06)
+_D50 = (0.3457, 0.3585)
 _CHANNEL_NAMES = {1: ("Y",), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
 
 
@@ -44,7 +45,10 @@ def profile(name: ProfileName, grey: bool = False) -> bytes:
 
     if grey:
         curve = None if name == "linear" else _srgb_curve()
-        made = imagecodecs.cms_profile("gray", gamma=1.0 if curve is None else None, transferfunction=curve)
+        # The white of a grey profile is that of the connection space, D50, or it would be adapted twice.
+        made = imagecodecs.cms_profile(
+            "gray", whitepoint=_D50, gamma=1.0 if curve is None else None, transferfunction=curve
+        )
     elif name == "srgb":
         made = imagecodecs.cms_profile("srgb")
     else:
