@@ -132,6 +132,13 @@ def test_jpeg(tmp_path, channels):
     assert np.abs(read(path, 1000).astype(int) - smooth(channels)).max() < 8
 
 
+def test_progressive_jpeg_is_decoded_as_a_whole(tmp_path):
+    assert read_photograph(write(tmp_path / "a.jpg", smooth(), "uint8"))[0].unit_rows == 1
+    path = write(tmp_path / "b.jpg", smooth(), "uint8", attributes=[("jpeg:progressive", 1)])
+    assert read_photograph(path)[0].unit_rows == 320
+    np.testing.assert_array_equal(read(path, 64), oiio.ImageInput.open(str(path)).read_image("uint8"))
+
+
 def test_exposure_profile_and_orientation(tmp_path):
     profile = rgb(sampled_curve(np.linspace(0, 1, 50) ** 2), name="Wide")
     path = write(

@@ -140,6 +140,17 @@ def test_truncation_shows_while_decoding(tmp_path, rng, compression, layout):
         list(photograph.bands(10))
 
 
+def test_file_replaced_after_its_header_was_read(tmp_path, rng):
+    path = write(tmp_path / "a.tif", pixels_of(rng, "uint16", 3))
+    photograph, _ = read_photograph(path)
+    path.write_bytes(b"II*\0")
+    with pytest.raises(CaptureError, match=r"a\.tif: has changed since its header was read"):
+        list(photograph.bands(10))
+    path.unlink()
+    with pytest.raises(CaptureError, match=r"a\.tif: cannot be read: .*No such file"):
+        list(photograph.bands(10))
+
+
 def test_damage_shows_while_decoding(tmp_path, rng):
     path = write(tmp_path / "bad.tif", pixels_of(rng, "uint16", 3), compression="zlib", rowsperstrip=5)
     photograph, _ = read_photograph(path)

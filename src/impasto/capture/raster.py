@@ -7,7 +7,6 @@ full array, and the reads after it report nothing. So each read is checked.
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,16 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.capture.header import Header, UnreadableError
+from impasto.capture.markers import (
+    check_jpeg_end,
+    is_interlaced,
+    is_progressive,
+    png_declared_transfer,
+)
 
 if TYPE_CHECKING:
     from OpenImageIO import ImageInput, ImageSpec
 
-_PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
-_PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
 # Scan lines that OpenEXR compresses together; other compressions work line by line.
 _EXR_BLOCK_ROWS = {"zip": 16, "pxr24": 16, "piz": 32, "b44": 32, "b44a": 32, "dwaa": 32, "dwab": 256}
-# Bytes at the end of a JPEG file in which its end marker is looked for; cameras may append a little.
-_JPEG_TAIL = 1 << 16
 
 
 def read_header(path: Path) -> Header:
@@ -40,9 +41,9 @@ def read_header(path: Path) -> Header:
     remarks: list[str] = []
     declared = None
     if format_name == "PNG":
-        declared = _png_declared_transfer(path)
+        declared = png_declared_transfer(path)
     elif format_name == "JPEG":
-        _check_jpeg_end(path)
+        check_jpeg_end(path)
     image = _open(path)
     try:
         spec = image.spec()
@@ -196,11 +197,8 @@ def _unit_rows(spec: ImageSpec, format_name: str, path: Path) -> int:
     if format_name == "EXR":
         block = spec.tile_height or _EXR_BLOCK_ROWS.get(str(spec.getattribute("compression")), 1)
         return int(min(block, spec.height))
-    if format_name == "PNG":
-        with path.open("rb") as file:
-            interlaced = file.read(29)[28] != 0
-        return int(spec.height) if interlaced else 1
-    return 1
+    whole = is_interlaced(path) if format_name == "PNG" else is_progressive(path)
+    return int(spec.height) if whole else 1
 
 
 def _check_exr(image: ImageInput) -> None:
@@ -215,57 +213,6 @@ def _check_exr(image: ImageInput) -> None:
             f"has a data window (x, y, width, height) {data} that is not its display window {display}",
             "Save the whole picture, without a crop or overscan",
         )
-
-
-def _check_jpeg_end(path: Path) -> None:
-    with path.open("rb") as file:
-        if file.read(2) != b"\xff\xd8":
-            raise UnreadableError("is not a JPEG file: it does not start with FF D8")
-        file.seek(max(2, path.stat().st_size - _JPEG_TAIL))
-        if b"\xff\xd9" not in file.read():
-            raise UnreadableError("is cut off: the end marker FF D9 is missing")
-
-
-def _png_declared_transfer(path: Path) -> str | None:
-    """Return what the sRGB or gAMA chunk of a PNG file states; raise if the file has no end.
-
-    OpenImageIO calls every PNG sRGB, whether the file says so or not. Both chunks come before the pixels,
-    whose thousands of chunks are walked only where the file does not end as it should.
-    """
-    declared = None
-    with path.open("rb") as file:
-        if file.read(8) != _PNG_SIGNATURE:
-            raise UnreadableError("is not a PNG file: the signature is wrong")
-        size = path.stat().st_size
-        while True:
-            start = file.read(8)
-            if len(start) < 8:
-                raise UnreadableError("is cut off: the end chunk IEND is missing")
-            length, kind = struct.unpack(">I4s", start)
-            if kind == b"IEND" or (kind == b"IDAT" and _ends_with_iend(path, size)):
-                return declared
-            if file.tell() + length + 4 > size:
-                raise UnreadableError(f"is cut off in its chunk {kind.decode('latin-1')}")
-            if kind == b"sRGB":
-                declared = "srgb"
-            elif kind == b"gAMA" and declared is None and length == 4:
-                (stored,) = struct.unpack(">I", file.read(4))
-                declared = _gamma_name(stored)
-                length = 0
-            file.seek(length + 4, 1)
-
-
-def _ends_with_iend(path: Path, size: int) -> bool:
-    with path.open("rb") as file:
-        file.seek(max(0, size - len(_PNG_END)))
-        return file.read() == _PNG_END
-
-
-def _gamma_name(stored: int) -> str | None:
-    """Return the transfer function for a gAMA chunk, which holds 100000 / gamma."""
-    if not stored:
-        return None
-    return "linear" if stored == 100000 else f"gamma:{100000 / stored:.6g}"
 
 
 def _number(spec: ImageSpec, name: str) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -87,8 +88,14 @@ def bands(path: Path, header: Header, rows: int) -> Iterator[tuple[int, NDArray[
     """
     import tifffile
 
-    with tifffile.TiffFile(path) as tiff, path.open("rb", buffering=0) as file:
-        page = tiff.pages.first
+    with ExitStack() as opened:
+        try:
+            page = opened.enter_context(tifffile.TiffFile(path)).pages.first
+        except OSError:
+            raise
+        except Exception as error:  # as in `read_header`
+            raise UnreadableError(f"has changed since its header was read: {error}") from error
+        file = opened.enter_context(path.open("rb", buffering=0))
         if _is_plain(page, header):
             yield from _plain_bands(page, file, header, rows)
         else:
