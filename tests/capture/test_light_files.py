@@ -1,6 +1,7 @@
 """CSV, TOML and matrix light files, and how a light file is found."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -244,3 +245,12 @@ def test_no_light_file(tmp_path):
         read_light_file(tmp_path / "dirs.lp")
     with pytest.raises(CaptureError, match=r"has the ending \.xlsx"):
         read_light_file(tmp_path / "lights.xlsx")
+
+
+def test_the_documented_example_is_valid(tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "captures.md").read_text(encoding="utf-8")
+    example = page.split("```toml\n")[1].split("```")[0]
+    file = read(tmp_path, "capture.toml", example)
+    assert not file.problems
+    assert [row.file for row in file.rows] == ["arm_-30.tif", "lamp_left.tif"]
+    assert file.clip_level == 64000
