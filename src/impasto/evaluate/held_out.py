@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from impasto.errors import OptionError, Problem, raise_problems
+from impasto.capture.light_files import read_light_file
+from impasto.errors import CaptureError, OptionError, Problem, raise_problems
 from impasto.geometry import Lights, zenith_azimuth
 
 
@@ -47,15 +50,14 @@ def spread_lights(lights: Lights, count: int) -> list[int]:
     return sorted(int(group[len(group) // 2]) for group in np.array_split(order, count))
 
 
-def named_lights(path: str | Path, names: tuple[str, ...]) -> list[int]:
-    """Read which photographs to hold out from a file.
+def named_lights(path: str | PathLike[str], names: tuple[str, ...]) -> list[int]:
+    """Read from a file which photographs to hold out.
 
     Parameters
     ----------
     path : path
-        A text file with one photograph per line, by its name with or without the ending. Empty lines and what
-        follows a # are ignored. A .lp file does as well: its first line may hold a count, and only the name
-        before the three numbers of each line is read.
+        A text file with one photograph per line, by its name with or without the ending; empty lines and what
+        follows a # are ignored. Or a light file (.lp, .csv, .toml), of which only the names count.
     names : tuple of str
         The names of the stack's photographs.
 
@@ -67,10 +69,16 @@ def named_lights(path: str | Path, names: tuple[str, ...]) -> list[int]:
     Raises
     ------
     OptionError
-        Listing every line that names no photograph of the stack, or if the file cannot be read, names none or
+        Listing every name that no photograph of the stack has, or if the file cannot be read, names none or
         all of them.
+    CaptureError
+        If a light file cannot be read.
     """
     path = Path(path)
+    if path.suffix.lower() in (".lp", ".csv", ".tsv", ".toml"):
+        file = read_light_file(path)
+        raise_problems(CaptureError, file.problems)
+        return listed_lights([(row.where, row.file) for row in file.rows if row.file], names, str(path))
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -78,19 +86,44 @@ def named_lights(path: str | Path, names: tuple[str, ...]) -> list[int]:
         raise OptionError(
             Problem(str(path), f"cannot be read: {reason}", "Give a text file with one photograph per line")
         ) from error
+    entries = [(f"{path} line {number}", line.split("#")[0].strip()) for number, line in enumerate(lines, 1)]
+    return listed_lights([entry for entry in entries if entry[1]], names, str(path))
+
+
+def listed_lights(
+    entries: Sequence[tuple[str, str]], names: tuple[str, ...], where: str = "held-out photographs"
+) -> list[int]:
+    """Return the lights that a list of names stands for.
+
+    Parameters
+    ----------
+    entries : sequence of (str, str)
+        Where each name stands, for messages, and the name, with or without folders and ending.
+    names : tuple of str
+        The names of the stack's photographs.
+    where : str, optional
+        What to call the list as a whole in messages.
+
+    Returns
+    -------
+    list of int
+        Indices into `names`, in rising order, each once.
+
+    Raises
+    ------
+    OptionError
+        Listing every name that no photograph has, or if the list names none or all of them.
+    """
     indices = {name: index for index, name in enumerate(names)}
     found: set[int] = set()
     problems = []
-    for number, line in enumerate(lines, start=1):
-        entry = _name(line, light_file=path.suffix.lower() == ".lp")
-        if not entry or (number == 1 and entry.isdigit() and entry not in indices):
-            continue
-        short = Path(entry.replace("\\", "/")).name
-        index = indices.get(short, indices.get(Path(short).stem))
+    for place, entry in entries:
+        short = PurePosixPath(entry.replace("\\", "/"))
+        index = indices.get(short.name, indices.get(short.stem))
         if index is None:
             problems.append(
                 Problem(
-                    where=f"{path} line {number}",
+                    where=place,
                     what=f"no photograph of the stack is called {entry!r}",
                     do=f"Use the names in the store, such as {names[0]!r}",
                 )
@@ -98,21 +131,10 @@ def named_lights(path: str | Path, names: tuple[str, ...]) -> list[int]:
         else:
             found.add(index)
     if not problems and not found:
-        problems.append(Problem(str(path), "names no photograph", "Write one photograph per line"))
+        problems.append(Problem(where, "names no photograph", "Name at least one"))
     if len(found) == len(names):
         problems.append(
-            Problem(
-                str(path), "names every photograph, so none is left to fit", "Name only those to hold out"
-            )
+            Problem(where, "names every photograph, so none is left to fit", "Name only those to hold out")
         )
     raise_problems(OptionError, problems)
     return sorted(found)
-
-
-def _name(line: str, light_file: bool) -> str:
-    """Return the name in a line, without comment and, in a .lp file, without the three numbers after it."""
-    line = line.split("#")[0].strip()
-    if not light_file:
-        return line.strip("\"'")
-    parts = line.rsplit(maxsplit=3)
-    return parts[0].strip("\"'") if len(parts) == 4 else line
