@@ -1,0 +1,1 @@
+"""The simulated paintings: relief, paints, and strokes that lay the one on the other."""
