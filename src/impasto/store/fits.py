@@ -1,0 +1,258 @@
+"""The fits of a store and their coarser levels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impasto.errors import Problem, StoreError
+from impasto.store.files import reading, writing
+from impasto.store.hierarchy import (
+    Attributes,
+    coarser_group,
+    create_map,
+    fit_group,
+    has_array,
+    open_array,
+    read_group,
+    remove,
+    source_problems,
+    write_group,
+)
+from impasto.store.layout import FITS, PYRAMIDS, Map, Unit, status_counts, units
+
+if TYPE_CHECKING:
+    import zarr
+
+Maps = dict[str, NDArray[Any]]
+
+
+class MapsWriter:
+    """Writes the maps of a fit, or of one of its coarser levels, unit by unit.
+
+    Every map of a unit is one shard, written once and whole; ``status`` is the last, so a unit counts as
+    whole if and only if its status can be read.
+
+    Parameters
+    ----------
+    store : Path
+    group : str
+        Path of the group.
+    maps : tuple of Map
+    height, width : int
+    attributes : mapping
+        Attributes of the group, without ``complete``.
+    """
+
+    def __init__(
+        self,
+        store: Path,
+        group: str,
+        maps: tuple[Map, ...],
+        height: int,
+        width: int,
+        attributes: Mapping[str, Any],
+    ) -> None:
+        self.store = store
+        self.group = group
+        self.maps = maps
+        self.height = height
+        self.width = width
+        self._attributes = dict(attributes)
+        parent = group.rpartition("/")[0]
+        while parent and read_group(store / parent) is None:
+            write_group(store, parent, {})
+            parent = parent.rpartition("/")[0]
+        if read_group(store / group) is None:
+            write_group(store, group, {**self._attributes, "complete": False})
+        for map in maps:
+            if not has_array(store, f"{group}/{map.name}"):
+                create_map(store, group, map, height, width)
+        self._arrays = {map.name: open_array(store, f"{group}/{map.name}", write=True) for map in maps}
+
+    def _shard(self, map: Map, unit: Unit) -> Path:
+        last = () if map.axis is None else ("0",)
+        return self.store.joinpath(self.group, map.name, "c", str(unit.row), str(unit.column), *last)
+
+    def is_whole(self, unit: Unit) -> bool:
+        """Return whether a unit was written to its end."""
+        status = next(map for map in self.maps if map.name == "status")
+        if not self._shard(status, unit).is_file():
+            return False
+        try:
+            self._arrays["status"][unit.rows, unit.columns]
+        except (OSError, RuntimeError, ValueError):  # cut short by a kill or a full disk
+            return False
+        return True
+
+    def unfinished(self) -> list[Unit]:
+        """Return the units that still have to be written."""
+        return [unit for unit in units(self.height, self.width) if not self.is_whole(unit)]
+
+    def write(self, unit: Unit, values: Mapping[str, NDArray[Any]]) -> None:
+        """Write a unit.
+
+        Parameters
+        ----------
+        unit : Unit
+        values : mapping of str to ndarray of shape (rows, columns[, k])
+            One entry per map.
+
+        Raises
+        ------
+        StoreError
+            If the disk is full or refuses.
+        """
+        self.begin(unit)
+        for map in self.maps:
+            self.write_map(unit, map, values[map.name])
+
+    def begin(self, unit: Unit) -> None:
+        """Forget what there is of a unit.
+
+        Shards that a kill cut short would be read, and found damaged, where the image ends inside of them.
+        """
+        for map in reversed(self.maps):
+            self._shard(map, unit).unlink(missing_ok=True)
+
+    def write_map(self, unit: Unit, map: Map, values: NDArray[Any]) -> None:
+        """Write one map of a unit; the caller sees to it that ``status`` is the last."""
+        with writing(self.store, f"{self.group}/{map.name}"):
+            self._arrays[map.name][unit.rows, unit.columns] = np.asarray(values, map.dtype)
+
+    def status_counts(self) -> NDArray[np.int64]:
+        """Return how many pixels have each status, as an ndarray of shape (256,), int64."""
+        counts = np.zeros(256, np.int64)
+        for unit in units(self.height, self.width):
+            counts += status_counts(np.asarray(self._arrays["status"][unit.rows, unit.columns]))
+        return counts
+
+    def finish(self, more: Mapping[str, Any]) -> None:
+        """Declare the group complete, and add attributes that were not known before."""
+        self._attributes.update(more)
+        write_group(self.store, self.group, {**self._attributes, "complete": True})
+
+
+def fit_attributes(store: str | Path, model: str) -> Attributes | None:
+    """Return the attributes of a fit, complete or not, or None if there is none."""
+    return read_group(Path(store) / fit_group(model))
+
+
+def remove_fit(store: Path, model: str) -> None:
+    """Remove a fit and its coarser levels."""
+    remove(store, fit_group(model), f"{PYRAMIDS}/{model}")
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A complete fit or one of its coarser levels, open for reading; pixels are read when asked for.
+
+    Parameters
+    ----------
+    store : Path
+    group : str
+        Path of the group.
+    attributes : dict
+        The attributes of the group, as docs/store.md lists them.
+    """
+
+    store: Path
+    group: str
+    attributes: Attributes = field(repr=False)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the maps."""
+        found = (path.parent.name for path in (self.store / self.group).glob("*/zarr.json"))
+        return tuple(sorted(found))
+
+    @cached_property
+    def _arrays(self) -> dict[str, zarr.Array[Any]]:
+        return {name: open_array(self.store, f"{self.group}/{name}") for name in self.names}
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width in pixels."""
+        height, width = self._arrays["status"].shape
+        return height, width
+
+    def read(self, rows: slice, columns: slice, names: Iterable[str] | None = None) -> Maps:
+        """Return maps of a tile.
+
+        Parameters
+        ----------
+        rows, columns : slice
+            The tile.
+        names : iterable of str, optional
+            Which maps, all by default.
+
+        Returns
+        -------
+        dict of str to ndarray of shape (rows, columns[, k])
+            float32, NaN where a pixel has no value; ``status`` uint8.
+
+        Raises
+        ------
+        StoreError
+            If a map is damaged.
+        """
+        tile = {}
+        for name in self.names if names is None else names:
+            do = "Run impasto fit with --overwrite to compute it anew"
+            with reading(self.store, f"{self.group}/{name}", do):
+                tile[name] = np.asarray(self._arrays[name][rows, columns])
+        return tile
+
+
+def open_fit(store: str | Path, model: str, level: int = 0) -> Fit:
+    """Open a fit of a store.
+
+    Parameters
+    ----------
+    store : path
+    model : str
+        Name of the model as `impasto.models` has it.
+    level : int, optional
+        0 for full size, 1 for half size, and so on.
+
+    Raises
+    ------
+    StoreError
+        If there is no store, it is from a newer version, or the fit or the level is missing or not finished.
+    """
+    store = Path(store)
+    problems = source_problems(store)
+    if problems:
+        raise StoreError(problems)
+    group = fit_group(model) if level == 0 else coarser_group(model, level)
+    attributes = read_group(store / group)
+    if attributes is None:
+        there = ", ".join(fitted_models(store)) or "none"
+        raise StoreError(
+            Problem(
+                where=f"{store}: {group}",
+                what=f"there is no such fit; fits in this store: {there}",
+                do=f"Make it with: impasto fit STORE --model {model}",
+            )
+        )
+    if not attributes.get("complete"):
+        raise StoreError(
+            Problem(
+                where=f"{store}: {group}",
+                what="is not finished",
+                do="Run the same impasto fit command again: it goes on from there",
+            )
+        )
+    return Fit(store, group, attributes)
+
+
+def fitted_models(store: str | Path) -> list[str]:
+    """Return the names of the models of which the store has a complete fit."""
+    found = ((path.name, read_group(path)) for path in (Path(store) / FITS).glob("*"))
+    return sorted(name for name, attributes in found if attributes and attributes.get("complete"))

@@ -1,0 +1,254 @@
+"""Groups and arrays of a store's Zarr v3 hierarchy.
+
+Groups are small JSON documents, written here directly and atomically; arrays go through zarr-python with the
+`zarrs` codec pipeline. zarr takes a third of a second to import, so that happens where an array is touched.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impasto.errors import Problem, StoreError
+from impasto.store.files import is_partial, write_json, writing
+from impasto.store.layout import FITS, INNER_CHUNK, PYRAMIDS, SCHEMA, STACK, STACK_CHUNK, UNIT, Map
+
+if TYPE_CHECKING:
+    import zarr
+
+Attributes = dict[str, Any]
+
+# zarr's configuration is global to the process, and so is this lock.
+_configuring = threading.Lock()
+
+
+@contextmanager
+def _pipeline() -> Iterator[None]:
+    """Have arrays opened inside use the Rust codecs, without changing zarr for the rest of the program."""
+    import zarr
+
+    with _configuring, zarr.config.set({"codec_pipeline.path": "zarrs.ZarrsCodecPipeline"}):
+        yield
+
+
+def provenance() -> Attributes:
+    """Return the attributes that say which program wrote a group."""
+    try:
+        program_version = version("impasto")
+    except PackageNotFoundError:  # run from its sources without being installed
+        program_version = "unknown"
+    return {"program": "impasto", "version": program_version}
+
+
+def read_group(path: Path) -> Attributes | None:
+    """Return the attributes of the group at `path`, or None where no group is.
+
+    Raises
+    ------
+    StoreError
+        If its metadata cannot be read.
+    """
+    document = path / "zarr.json"
+    try:
+        metadata = json.loads(document.read_text(encoding="utf-8"))
+        if metadata["node_type"] != "group":
+            return None
+        attributes: Attributes = metadata.get("attributes", {})
+        return attributes
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise StoreError(
+            Problem(
+                where=str(document),
+                what=f"is not readable as Zarr v3 metadata: {error}",
+                do="Restore it from a copy, or make the store anew",
+            )
+        ) from error
+
+
+def write_group(store: Path, path: str, attributes: Mapping[str, Any]) -> None:
+    """Write the metadata of the group `path` ("" for the root), whole or not at all."""
+    with writing(store, f"{path or 'the store'}/zarr.json".lstrip("/")):
+        write_json(
+            store / path / "zarr.json",
+            {"zarr_format": 3, "node_type": "group", "attributes": dict(attributes)},
+        )
+
+
+def target_problems(store: Path) -> list[Problem]:
+    """Return what forbids to make or change a store at `store`; nothing there or an empty folder is fine."""
+    if not store.exists():
+        return []
+    if not store.is_dir():
+        return [
+            Problem(str(store), "is a file, and a store is a folder", "Choose another name for the store")
+        ]
+    if all(is_partial(path) for path in store.iterdir()):
+        return []
+    return source_problems(store)
+
+
+def source_problems(store: Path) -> list[Problem]:
+    """Return what is wrong with the store as a whole: missing, something else, or from a newer version."""
+    try:
+        attributes = read_group(store)
+    except StoreError as error:
+        return error.problems
+    if not store.exists():
+        return [Problem(str(store), "there is no such store", "Make it with: impasto stack PHOTOS STORE")]
+    schema = None if attributes is None else attributes.get("impasto_schema")
+    if not isinstance(schema, int):
+        return [
+            Problem(
+                where=str(store),
+                what="is not an impasto store (its zarr.json is missing or has no impasto_schema)",
+                do="Give the folder that impasto stack made; nothing was changed here",
+            )
+        ]
+    if schema > SCHEMA:
+        return [
+            Problem(
+                where=str(store),
+                what=f"has schema {schema}, and this version of impasto knows schemas up to {SCHEMA}",
+                do="Use the version of impasto that made it, or a newer one; nothing was changed here",
+            )
+        ]
+    return []
+
+
+def remove(store: Path, *paths: str) -> None:
+    """Remove groups of an impasto store, their metadata first, so that none of them looks whole meanwhile.
+
+    Raises
+    ------
+    StoreError
+        If `store` is not an impasto store of a schema that this version knows.
+    """
+    problems = source_problems(store)
+    if problems:
+        raise StoreError(problems)
+    for path in paths:
+        (store / path / "zarr.json").unlink(missing_ok=True)
+    for path in paths:
+        if (store / path).exists():
+            shutil.rmtree(store / path)
+
+
+def create_stack_array(
+    store: Path, shape: tuple[int, int, int, int], dtype: np.dtype, attributes: Attributes
+) -> None:
+    """Create ``stack/radiance`` for `shape` (light, y, x, channel), uint16 or float32."""
+    _create(
+        store,
+        f"{STACK}/radiance",
+        shape=shape,
+        dtype=dtype,
+        dimension_names=("light", "y", "x", "channel"),
+        chunks=(1, STACK_CHUNK, STACK_CHUNK, shape[3]),
+        # A chunk that is lost reads as overexposed or missing, never as dark.
+        fill_value=float("nan") if dtype.kind == "f" else np.iinfo(dtype).max,
+        attributes=attributes,
+    )
+
+
+def create_map(store: Path, group: str, map: Map, height: int, width: int) -> None:
+    """Create the array of one map of a fit or of a coarser level, sharded by units."""
+    axis = () if map.axis is None else (map.size,)
+    attributes: Attributes = {"long_name": map.long_name, "units": map.units}
+    _create(
+        store,
+        f"{group}/{map.name}",
+        shape=map.shape(height, width),
+        dtype=np.dtype(map.dtype),
+        dimension_names=map.dims,
+        chunks=(INNER_CHUNK, INNER_CHUNK, *axis),
+        shards=(UNIT, UNIT, *axis),
+        fill_value=map.fill_value,
+        attributes=attributes,
+    )
+
+
+def write_table(
+    store: Path,
+    path: str,
+    values: NDArray[np.float64] | Sequence[str],
+    dims: tuple[str, ...],
+    attributes: Attributes,
+) -> None:
+    """Write a small array in one chunk: numbers as float64, names as strings of variable length."""
+    names = not isinstance(values, np.ndarray)
+    data = np.array(values, dtype=object) if names else np.ascontiguousarray(values, np.float64)
+    array = _create(
+        store,
+        path,
+        shape=data.shape,
+        dtype=str if names else np.dtype(np.float64),
+        dimension_names=dims,
+        chunks=data.shape,
+        fill_value="" if names else float("nan"),
+        attributes=attributes,
+    )
+    with writing(store, path):
+        array[...] = data
+
+
+def _create(store: Path, path: str, **arguments: Any) -> zarr.Array[Any]:
+    import zarr
+    from zarr.codecs import ZstdCodec
+
+    # Level -1 writes 16-bit photographs and maps, whose last bits are noise, faster than lz4 does, and shrinks
+    # decoded 8-bit ones to half. The checksum is zstd's own because a crc32c after the compressor is not looked
+    # at when a part of a chunk is read.
+    compressor = ZstdCodec(level=-1, checksum=True)
+    with writing(store, path), _pipeline():
+        return zarr.create_array(
+            store, name=path, zarr_format=3, overwrite=True, compressors=[compressor], **arguments
+        )
+
+
+def open_array(store: Path, path: str, *, write: bool = False) -> zarr.Array[Any]:
+    """Open an array of a store.
+
+    Raises
+    ------
+    StoreError
+        If it is not there or its metadata cannot be read.
+    """
+    import zarr
+
+    try:
+        with _pipeline():
+            return zarr.open_array(store, path=path, mode="r+" if write else "r", zarr_format=3)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise StoreError(
+            Problem(
+                where=f"{store}: {path}",
+                what=f"is missing or its metadata are damaged: {error}",
+                do="Restore it from a copy, or run the command that made it again with --overwrite",
+            )
+        ) from error
+
+
+def has_array(store: Path, path: str) -> bool:
+    """Return whether the metadata of the array at `path` are there."""
+    return (store / path / "zarr.json").is_file()
+
+
+def coarser_group(model: str, level: int) -> str:
+    """Return the path of a coarser level of a fit; level 1 has half the size."""
+    return f"{PYRAMIDS}/{model}/{level}"
+
+
+def fit_group(model: str) -> str:
+    """Return the path of a fit."""
+    return f"{FITS}/{model}"

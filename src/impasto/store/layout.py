@@ -1,0 +1,192 @@
+"""What lies where in a store, and in which pieces: docs/store.md in code, without a word of Zarr.
+
+A stack is cut into chunks of one light and 512 x 512 pixels, because photographs arrive one by one and fits
+read all lights of a tile. A fit is cut into units of 1024 x 1024 pixels, each written once and whole, so that
+an interrupted fit knows what it has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+SCHEMA = 1
+
+STACK = "stack"
+FITS = "fits"
+PYRAMIDS = "pyramids"
+
+STACK_CHUNK = 512
+UNIT = 1024
+INNER_CHUNK = 256
+
+# Levels stop where a picture fits on a screen at once.
+SMALLEST_LEVEL = 512
+
+STATUS_MEANING = {
+    0: "converged",
+    1: "step limit",
+    2: "at a bound",
+    3: "too few lights",
+    4: "all clipped",
+    5: "not identified",
+    255: "not fitted",
+}
+
+# From harmless to worst, for the status of a coarser pixel: "too few lights" and "all clipped" leave a pixel
+# without any value, "not identified" without some.
+STATUS_SEVERITY = (0, 2, 1, 5, 4, 3, 255)
+
+
+@dataclass(frozen=True)
+class Map:
+    """One array of a fit.
+
+    Parameters
+    ----------
+    name : str
+    axis : str or None
+        Name of the axis after (y, x): ``xyz``, ``channel`` or ``lobe``; None where a pixel has one value.
+    size : int
+        Length of that axis, 1 without one.
+    units : str
+        Unit as `pint` and CF write it; ``1`` for a ratio.
+    long_name : str
+        What a person reads beside a colour bar.
+    dtype : str
+    """
+
+    name: str
+    axis: str | None
+    size: int
+    units: str
+    long_name: str
+    dtype: str = "float32"
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of the axes."""
+        return ("y", "x") if self.axis is None else ("y", "x", self.axis)
+
+    def shape(self, height: int, width: int) -> tuple[int, ...]:
+        """Return the shape of the array for an image of `height` x `width` pixels."""
+        return (height, width) if self.axis is None else (height, width, self.size)
+
+    @property
+    def fill_value(self) -> float | int:
+        """What a pixel holds before it is fitted: NaN, or the status "not fitted"."""
+        return 255 if self.name == "status" else float("nan")
+
+
+def fit_maps(shape_names: tuple[str, ...], *, lobes: int, ambient: bool, channels: int) -> tuple[Map, ...]:
+    """Return the maps that a fit of a model has, in the order in which they are written.
+
+    Parameters
+    ----------
+    shape_names : tuple of str
+        The model's shape parameters, such as ``c`` or ``shininess``.
+    lobes : int
+        Specular lobes, 0 for a matte model.
+    ambient : bool
+        Whether the model has an ambient term.
+    channels : int
+        Channels of the stack.
+
+    Returns
+    -------
+    tuple of Map
+        ``status`` is the last: its presence says that a unit is whole.
+    """
+    lobe_axis = "lobe" if lobes > 1 else None
+    parameters = [Map("diffuse", "channel", channels, "1", "diffuse magnitude")]
+    if lobes:
+        parameters.append(Map("specular", lobe_axis, lobes, "1", "specular magnitude"))
+    parameters += [Map(name, None, 1, "1", f"shape of the lobe ({name})") for name in shape_names]
+    if ambient:
+        parameters.append(Map("ambient", "channel", channels, "1", "ambient term"))
+    deviations = [
+        Map(f"{map.name}_sd", map.axis, map.size, map.units, f"standard deviation of {map.long_name}")
+        for map in parameters
+    ]
+    return (
+        Map("normal", "xyz", 3, "1", "unit normal"),
+        *parameters,
+        Map("normal_sd", None, 1, "rad", "standard deviation of the normal's direction"),
+        *deviations,
+        Map("chi2_reduced", None, 1, "1", "reduced chi-square"),
+        Map("residual_rms", None, 1, "1", "root mean square residual in relative radiance"),
+        Map("status", None, 1, "1", "how the fit of the pixel ended", dtype="uint8"),
+    )
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A piece of a fit that is computed and written as a whole.
+
+    Parameters
+    ----------
+    row, column : int
+        Number of the unit from the top and from the left.
+    rows, columns : slice
+        The pixels it holds.
+    """
+
+    row: int
+    column: int
+    rows: slice
+    columns: slice
+
+    @property
+    def height(self) -> int:
+        """Rows of pixels."""
+        return int(self.rows.stop - self.rows.start)
+
+    @property
+    def width(self) -> int:
+        """Columns of pixels."""
+        return int(self.columns.stop - self.columns.start)
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels."""
+        return self.height * self.width
+
+    def tiles(self, height: int, width: int) -> Iterator[tuple[slice, slice]]:
+        """Yield rows and columns of tiles of at most `height` x `width` pixels, row by row."""
+        for row in range(self.rows.start, self.rows.stop, height):
+            for column in range(self.columns.start, self.columns.stop, width):
+                yield (
+                    slice(row, min(row + height, self.rows.stop)),
+                    slice(column, min(column + width, self.columns.stop)),
+                )
+
+
+def units(height: int, width: int) -> list[Unit]:
+    """Return the units of an image of `height` x `width` pixels, row by row."""
+    return [
+        Unit(
+            row=row,
+            column=column,
+            rows=slice(row * UNIT, min((row + 1) * UNIT, height)),
+            columns=slice(column * UNIT, min((column + 1) * UNIT, width)),
+        )
+        for row in range(-(-height // UNIT))
+        for column in range(-(-width // UNIT))
+    ]
+
+
+def level_sizes(height: int, width: int) -> list[tuple[int, int]]:
+    """Return height and width of each coarser level, the first at half size."""
+    sizes = []
+    while max(height, width) >= SMALLEST_LEVEL:
+        height, width = -(-height // 2), -(-width // 2)
+        sizes.append((height, width))
+    return sizes
+
+
+def status_counts(status: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Return how many pixels have each status code, as an ndarray of shape (256,), int64."""
+    return np.bincount(status.ravel(), minlength=256).astype(np.int64)

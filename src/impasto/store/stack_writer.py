@@ -1,0 +1,242 @@
+"""Write the stack of a store, photograph by photograph."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impasto.errors import Problem, StoreError
+from impasto.geometry import Camera, Lights
+from impasto.store.files import digest, writing
+from impasto.store.hierarchy import (
+    Attributes,
+    create_stack_array,
+    open_array,
+    provenance,
+    read_group,
+    remove,
+    write_group,
+    write_table,
+)
+from impasto.store.layout import FITS, PYRAMIDS, SCHEMA, STACK
+
+_TABLES: dict[str, tuple[tuple[str, ...], Attributes]] = {
+    "light_name": (("light",), {"long_name": "name of the photograph"}),
+    "light_direction": (("light", "xyz"), {"long_name": "unit vector towards the light", "units": "1"}),
+    "light_position_mm": (
+        ("light", "xyz"),
+        {"long_name": "position of the light; NaN if far away", "units": "mm"},
+    ),
+    "light_intensity": (
+        ("light", "channel"),
+        {"long_name": "relative irradiance at the centre", "units": "1"},
+    ),
+    "light_angular_size_deg": (
+        ("light",),
+        {"long_name": "angular diameter of the source", "units": "degree"},
+    ),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class StackHeader:
+    """Everything about a stack that is known before a photograph is decoded.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        (light, y, x, channel).
+    dtype : dtype
+        uint16 or float32.
+    lights : Lights
+    camera : Camera
+    scale, offset : float
+        Relative radiance = scale * stored value + offset.
+    clip_level : tuple of float or None
+        Relative radiance per channel from which on a sample is clipped; None where none is.
+    noise : mapping
+        ``read``, ``photon``, ``relative``: variance = read² + photon · Y + (relative · Y)² at radiance Y.
+    inputs : sequence of mapping
+        One per light: ``name``, ``file`` and how it was taken and decoded.
+    more : mapping
+        Further attributes, as JSON.
+    """
+
+    shape: tuple[int, int, int, int]
+    dtype: np.dtype
+    lights: Lights
+    camera: Camera
+    scale: float
+    offset: float
+    clip_level: tuple[float | None, ...]
+    noise: Mapping[str, float]
+    inputs: Sequence[Mapping[str, Any]]
+    more: Mapping[str, Any] = field(default_factory=dict)
+
+    def attributes(self) -> Attributes:
+        """Return the attributes that follow from the settings alone."""
+        camera = self.camera
+        settings = {
+            "scale": self.scale,
+            "offset": self.offset,
+            "clip_level": list(self.clip_level),
+            "noise": dict(self.noise),
+            **self.more,
+            "camera": {
+                "view_direction": camera.view_direction.tolist(),
+                "distance_mm": camera.distance_mm,
+                "mm_per_px": camera.mm_per_px,
+            },
+        }
+        identity = {
+            **settings,
+            "shape": list(self.shape),
+            "dtype": self.dtype.name,
+            "inputs": [dict(entry) for entry in self.inputs],
+            "lights": {name: _as_json(values) for name, values in self.tables().items()},
+        }
+        return {**settings, "settings_sha256": digest(identity)}
+
+    def tables(self) -> dict[str, NDArray[np.float64] | tuple[str, ...]]:
+        """Return the arrays that describe the lights."""
+        lights, channels = self.lights, self.shape[3]
+        return {
+            "light_name": lights.names,
+            "light_direction": lights.direction,
+            "light_position_mm": lights.position_mm,
+            "light_intensity": np.broadcast_to(lights.intensity, (len(lights), channels)),
+            "light_angular_size_deg": lights.angular_size_deg,
+        }
+
+
+def _as_json(values: NDArray[np.float64] | tuple[str, ...]) -> Any:
+    """Return nested lists in which None stands for NaN."""
+    if isinstance(values, tuple):
+        return list(values)
+    nested = values.astype(object)
+    nested[np.isnan(values)] = None
+    return nested.tolist()
+
+
+class StackWriter:
+    """Writes a stack photograph by photograph, and remembers which are whole.
+
+    A photograph counts as whole when its SHA-256 stands in the metadata, which happens after its last chunk
+    is written. Methods may be called from several threads, each with its own photograph.
+
+    Parameters
+    ----------
+    store : Path
+    header : StackHeader
+    fresh : bool
+        Whether to begin anew even if the store holds the same stack.
+    """
+
+    def __init__(self, store: Path, header: StackHeader, *, fresh: bool) -> None:
+        self.store = store
+        self._header = header
+        self._writing = threading.Lock()
+        self._attributes = self._begin({**provenance(), **header.attributes()}, fresh)
+        self._radiance = open_array(store, f"{STACK}/radiance", write=True)
+
+    def _begin(self, settings: Attributes, fresh: bool) -> Attributes:
+        """Continue what the store holds of the same stack, or start anew; return the group's attributes."""
+        store = self.store
+        if read_group(store) is None:
+            write_group(store, "", {"impasto_schema": SCHEMA, **provenance()})
+        found = read_group(store / STACK)
+        if found is not None and not fresh and all(found.get(key) == settings[key] for key in settings):
+            return found
+        remove(store, FITS, PYRAMIDS, STACK)
+        create_stack_array(
+            store,
+            self._header.shape,
+            self._header.dtype,
+            {"long_name": "relative radiance, as scale * value + offset", "units": "1"},
+        )
+        for name, values in self._header.tables().items():
+            dims, attributes = _TABLES[name]
+            write_table(store, f"{STACK}/{name}", _owned(values), dims, attributes)
+        # Without the group's own metadata the arrays above do not count, so it comes last.
+        begun = {
+            "coordinates": " ".join(_TABLES),
+            **settings,
+            "inputs": [{**entry, "sha256": None, "clipped_samples": None} for entry in self._header.inputs],
+            "complete": False,
+        }
+        write_group(store, STACK, begun)
+        return begun
+
+    @property
+    def sha256(self) -> list[str | None]:
+        """SHA-256 per photograph, None for those that are not written whole."""
+        return [entry["sha256"] for entry in self._attributes["inputs"]]
+
+    def start_light(self, light: int) -> None:
+        """Forget what there is of a photograph, whole or in part."""
+        self._record(light, None, None)
+        # Chunks that a kill cut short would be read, and found damaged, where a band fills them in part only.
+        folder = self.store / STACK / "radiance" / "c" / str(light)
+        if folder.exists():
+            shutil.rmtree(folder)
+
+    def write_band(self, light: int, row: int, band: NDArray[Any]) -> None:
+        """Write rows of a photograph.
+
+        Parameters
+        ----------
+        light : int
+        row : int
+            The first row; a multiple of the chunk's height, so that no chunk is written twice.
+        band : ndarray of shape (rows, W, C)
+            Values as stored.
+        """
+        with writing(self.store, f"{STACK}/radiance"):
+            self._radiance[light : light + 1, row : row + band.shape[0]] = band[np.newaxis]
+
+    def finish_light(self, light: int, sha256: str, clipped_samples: int) -> None:
+        """Record that a photograph is written whole."""
+        self._record(light, sha256, clipped_samples)
+
+    def _record(self, light: int, sha256: str | None, clipped_samples: int | None) -> None:
+        with self._writing:
+            entry = self._attributes["inputs"][light]
+            if (entry["sha256"], entry["clipped_samples"]) != (sha256, clipped_samples):
+                entry.update(sha256=sha256, clipped_samples=clipped_samples)
+                write_group(self.store, STACK, self._attributes)
+
+    def finish(self) -> None:
+        """Declare the stack complete.
+
+        Raises
+        ------
+        StoreError
+            If a photograph is missing.
+        """
+        missing = [entry["name"] for entry in self._attributes["inputs"] if entry["sha256"] is None]
+        if missing:
+            raise StoreError(unfinished_stack(self.store, self._attributes))
+        self._attributes["complete"] = True
+        write_group(self.store, STACK, self._attributes)
+
+
+def _owned(values: NDArray[np.float64] | tuple[str, ...]) -> NDArray[np.float64] | tuple[str, ...]:
+    return values if isinstance(values, tuple) else np.array(values)
+
+
+def unfinished_stack(store: Path, attributes: Attributes) -> Problem:
+    """Return the problem that a stack is not finished, with how far it is."""
+    inputs = attributes.get("inputs", [])
+    done = sum(entry["sha256"] is not None for entry in inputs)
+    return Problem(
+        where=f"{store}: {STACK}",
+        what=f"is not finished: {done} of {len(inputs)} photographs are in it",
+        do="Run the same impasto stack command again: it goes on from there",
+    )

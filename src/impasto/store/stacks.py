@@ -1,0 +1,204 @@
+"""Read the stack of a store: linearised photographs under known lights."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from impasto.errors import Problem, StoreError
+from impasto.geometry import Camera, Lights
+from impasto.store.files import digest, reading
+from impasto.store.hierarchy import Attributes, has_array, open_array, read_group, source_problems
+from impasto.store.layout import STACK
+from impasto.store.stack_writer import unfinished_stack
+
+if TYPE_CHECKING:
+    import zarr
+
+_AGAIN = "Run impasto stack with the same photographs and --overwrite to write it anew"
+
+
+@dataclass(frozen=True)
+class Stack:
+    """A complete stack, open for reading; pixels are read when asked for.
+
+    Parameters
+    ----------
+    store : Path
+    attributes : dict
+        The attributes of the group, as docs/store.md lists them.
+    """
+
+    store: Path
+    attributes: Attributes = field(repr=False)
+
+    @cached_property
+    def _radiance(self) -> zarr.Array[Any]:
+        return open_array(self.store, f"{STACK}/radiance")
+
+    def _table(self, name: str) -> NDArray[Any]:
+        path = f"{STACK}/{name}"
+        with reading(self.store, path, _AGAIN):
+            return np.asarray(open_array(self.store, path)[...])
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """Lengths of (light, y, x, channel)."""
+        lights, height, width, channels = self._radiance.shape
+        return lights, height, width, channels
+
+    @property
+    def dtype(self) -> np.dtype:
+        """Type of the stored values: uint16 or float32."""
+        return np.dtype(self._radiance.dtype)
+
+    @cached_property
+    def lights(self) -> Lights:
+        """The lights, one per photograph."""
+        return Lights(
+            names=tuple(str(name) for name in self._table("light_name")),
+            direction=self._table("light_direction"),
+            position_mm=self._table("light_position_mm"),
+            intensity=self._table("light_intensity"),
+            angular_size_deg=self._table("light_angular_size_deg"),
+        )
+
+    @property
+    def camera(self) -> Camera:
+        """Where the camera stands."""
+        camera = self.attributes["camera"]
+        return Camera(
+            view_direction=np.array(camera["view_direction"], np.float64),
+            distance_mm=camera["distance_mm"],
+            mm_per_px=camera["mm_per_px"],
+        )
+
+    @property
+    def scale(self) -> float:
+        """Relative radiance of one step of the stored values."""
+        return float(self.attributes["scale"])
+
+    @property
+    def offset(self) -> float:
+        """Relative radiance of the stored value 0."""
+        return float(self.attributes["offset"])
+
+    @property
+    def clip_level(self) -> NDArray[np.float64]:
+        """Relative radiance from which on a sample is clipped, shape (C,); infinite where none is."""
+        levels = self.attributes["clip_level"]
+        return np.array([math.inf if level is None else level for level in levels], np.float64)
+
+    @property
+    def noise(self) -> tuple[float, float, float]:
+        """The noise model (read, photon, relative): variance = read² + photon · Y + (relative · Y)²."""
+        noise = self.attributes["noise"]
+        return float(noise["read"]), float(noise["photon"]), float(noise["relative"])
+
+    @property
+    def light_rgb(self) -> NDArray[np.float64] | None:
+        """Colour of the light in the stack's own space, shape (C,), if it was measured."""
+        colour = self.attributes.get("light_rgb")
+        return None if colour is None else np.array(colour, np.float64)
+
+    @property
+    def sha256(self) -> str:
+        """A digest of the stack's settings and of the contents of every photograph."""
+        photographs = [entry["sha256"] for entry in self.attributes["inputs"]]
+        return digest([self.attributes["settings_sha256"], photographs])
+
+    @property
+    def clipped_samples(self) -> int:
+        """Number of clipped samples over all photographs and channels."""
+        return sum(int(entry["clipped_samples"]) for entry in self.attributes["inputs"])
+
+    def read(self, rows: slice, columns: slice, lights: ArrayLike | None = None) -> NDArray[Any]:
+        """Return stored values of a tile.
+
+        Parameters
+        ----------
+        rows, columns : slice
+            The tile, with start and stop.
+        lights : array_like of int, optional
+            Which lights, all by default.
+
+        Returns
+        -------
+        ndarray of shape (L, rows, columns, C), uint16 or float32, C-contiguous
+            Relative radiance is `scale` * value + `offset`; NaN where a float sample is missing.
+
+        Raises
+        ------
+        StoreError
+            Listing every photograph whose stored pixels are damaged.
+        """
+        try:
+            return self._read(rows, columns, lights)
+        except (OSError, RuntimeError, ValueError) as error:
+            raise StoreError(self._damage(rows, columns, error)) from error
+
+    def _read(self, rows: slice, columns: slice, lights: ArrayLike | None) -> NDArray[Any]:
+        if lights is None:
+            return np.asarray(self._radiance[:, rows, columns, :])
+        index = np.asarray(lights, dtype=np.intp)
+        tile = np.empty(
+            (len(index), rows.stop - rows.start, columns.stop - columns.start, self.shape[3]), self.dtype
+        )
+        # Runs of neighbouring lights keep to slices, the only selection that the Rust codecs take.
+        for run in np.split(np.arange(len(index)), np.flatnonzero(np.diff(index) != 1) + 1):
+            if len(run):
+                first, last = int(index[run[0]]), int(index[run[-1]])
+                tile[run[0] : run[-1] + 1] = self._radiance[first : last + 1, rows, columns, :]
+        return tile
+
+    def _damage(self, rows: slice, columns: slice, error: Exception) -> list[Problem]:
+        problems = []
+        place = f"{self.store}: {STACK}/radiance"
+        where = f"rows {rows.start} to {rows.stop - 1}, columns {columns.start} to {columns.stop - 1}"
+        for light, entry in enumerate(self.attributes["inputs"]):
+            try:
+                self._read(rows, columns, [light])
+            except (OSError, RuntimeError, ValueError) as cause:
+                problems.append(Problem(place, f"{entry['name']} is damaged at {where}: {cause}", _AGAIN))
+        return problems or [Problem(place, f"cannot be read at {where}: {error}", _AGAIN)]
+
+    def radiance(self, rows: slice, columns: slice, lights: ArrayLike | None = None) -> NDArray[np.float32]:
+        """Return relative radiance of a tile; parameters and errors as for `read`.
+
+        Returns
+        -------
+        ndarray of shape (L, rows, columns, C), float32
+        """
+        values = self.read(rows, columns, lights).astype(np.float32)
+        if (self.scale, self.offset) != (1.0, 0.0):
+            values *= np.float32(self.scale)
+            values += np.float32(self.offset)
+        return values
+
+
+def open_stack(store: str | Path) -> Stack:
+    """Open the stack of a store.
+
+    Raises
+    ------
+    StoreError
+        If there is no store, it is from a newer version, or its stack is missing or not finished.
+    """
+    store = Path(store)
+    problems = source_problems(store)
+    if problems:
+        raise StoreError(problems)
+    attributes = read_group(store / STACK)
+    if attributes is None or not has_array(store, f"{STACK}/radiance"):
+        raise StoreError(
+            Problem(str(store), "has no stack of photographs", "Make it with: impasto stack PHOTOS STORE")
+        )
+    if not attributes.get("complete"):
+        raise StoreError(unfinished_stack(store, attributes))
+    return Stack(store, attributes)
