@@ -206,9 +206,9 @@ def _create(store: Path, path: str, **arguments: Any) -> zarr.Array[Any]:
     import zarr
     from zarr.codecs import ZstdCodec
 
-    # Level -1 writes 16-bit photographs and maps, whose last bits are noise, faster than lz4 does, and shrinks
-    # decoded 8-bit ones to half. The checksum is zstd's own because a crc32c after the compressor is not looked
-    # at when a part of a chunk is read.
+    # Level -1 writes 16-bit photographs and maps, whose last bits are noise, faster than lz4 does, and
+    # shrinks decoded 8-bit ones to half. The checksum is zstd's own, because a crc32c after the compressor is
+    # not looked at when a part of a chunk is read.
     compressor = ZstdCodec(level=-1, checksum=True)
     with writing(store, path), _pipeline():
         return zarr.create_array(
