@@ -1,0 +1,379 @@
+"""Stack photographs: decode, linearise and write them into a store, in parallel and in bounded memory."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from impasto import store as stores
+from impasto.capture import Capture, Photograph, read_capture
+from impasto.errors import CaptureError, Problem, StoreError, raise_problems
+from impasto.linearise import Linearisation, linearisations
+from impasto.progress import progress
+
+# Noise in relative radiance where the capture does not state it, by the type of the photographs: an 8-bit
+# encoding rounds to half a per cent of the radiance and to 0.001 near black; see docs/store.md.
+_NOISE = {
+    "uint8": {"read": 1e-3, "photon": 1e-5, "relative": 5e-3},
+    "uint16": {"read": 1e-4, "photon": 0.0, "relative": 5e-3},
+    "float32": {"read": 1e-4, "photon": 0.0, "relative": 5e-3},
+}
+
+# Stored size over raw size: noisy 16-bit photographs shrink little, 8-bit ones by half.
+_STORED_SHARE = {"uint8": 0.6, "uint16": 0.95, "float32": 0.95}
+
+# What the program needs before the first photograph is decoded.
+_BASE_BYTES = 0.3e9
+
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class StackSummary:
+    """What `stack` did.
+
+    Parameters
+    ----------
+    store : Path
+    photographs : int
+    height, width, channels : int
+    transfer : str
+        How the photographs were decoded to linear light.
+    decoded, kept : int
+        Photographs decoded by this run, and those that an earlier run had finished.
+    already : bool
+        Whether the store held all of it before, so that nothing was done.
+    clipped_samples : dict of str to int
+        Per photograph.
+    decoders : int
+        Photographs decoded at a time.
+    seconds : float
+    notes : tuple of str
+        What was assumed, left out or normalised.
+    """
+
+    store: Path
+    photographs: int
+    height: int
+    width: int
+    channels: int
+    transfer: str
+    decoded: int
+    kept: int
+    already: bool
+    clipped_samples: dict[str, int]
+    decoders: int
+    seconds: float
+    notes: tuple[str, ...]
+
+
+def stack(
+    photos: str | os.PathLike[str],
+    store: str | os.PathLike[str],
+    *,
+    lights: str | os.PathLike[str] | None = None,
+    exclude: Iterable[str] = (),
+    overwrite: bool = False,
+    memory_bytes: float = 1.2e9,
+    show_progress: bool | None = None,
+) -> StackSummary:
+    """Put the photographs of a folder into a store, as linear radiance.
+
+    A run that was interrupted is continued by calling again with the same arguments: photographs that are
+    in the store whole are not decoded again. The store depends on the inputs alone, not on how often it was
+    interrupted.
+
+    Parameters
+    ----------
+    photos : path
+        Folder with the photographs.
+    store : path
+        Folder to make.
+    lights : path, optional
+        File with the lights; found in `photos` if there is one.
+    exclude : iterable of str, optional
+        Names of photographs to leave out.
+    overwrite : bool, optional
+        Whether to replace a stack made from other inputs, and with it the fits that were made from it.
+    memory_bytes : float, optional
+        Memory that the whole process may use; the number of photographs decoded at a time follows from it.
+    show_progress : bool, optional
+        Whether to show a progress bar; by default, if standard error is a terminal.
+
+    Returns
+    -------
+    StackSummary
+
+    Raises
+    ------
+    CaptureError
+        If photographs or lights cannot be used, listing everything that is wrong.
+    StoreError
+        If the store cannot be written, is not one, is from a newer version, or holds something else.
+    """
+    started = time.perf_counter()
+    path = Path(store)
+    capture = _read(Path(photos), path, lights, exclude)
+    job = _Job(capture, memory_bytes, show_progress)
+    with stores.run(path, "stack") as log:
+        fresh, already = _compare(path, job, overwrite)
+        kept = len(capture.photographs)
+        if not already:
+            raise_problems(StoreError, _room(path, job))
+            kept = job.write(stores.StackWriter(path, job.header, fresh=fresh))
+        log.write("summary", decoded=len(capture.photographs) - kept, decoders=job.decoders)
+    inputs = stores.open_stack(path).attributes["inputs"]
+    _, height, width, channels = job.header.shape
+    return StackSummary(
+        store=path,
+        photographs=len(capture.photographs),
+        height=height,
+        width=width,
+        channels=channels,
+        transfer=capture.photographs[0].transfer,
+        decoded=len(capture.photographs) - kept,
+        kept=kept,
+        already=already,
+        clipped_samples={entry["name"]: entry["clipped_samples"] for entry in inputs},
+        decoders=job.decoders,
+        seconds=time.perf_counter() - started,
+        notes=capture.notes,
+    )
+
+
+def _read(
+    photos: Path, store: Path, lights: str | os.PathLike[str] | None, exclude: Iterable[str]
+) -> Capture:
+    """Read the capture; report its problems and the store's together."""
+    problems = stores.target_problems(store)
+    try:
+        capture = read_capture(photos, lights, exclude)
+    except CaptureError as error:
+        raise CaptureError([*error.problems, *problems]) from error
+    raise_problems(StoreError, problems)
+    return capture
+
+
+def _compare(store: Path, job: _Job, overwrite: bool) -> tuple[bool, bool]:
+    """Compare the store with what is to be put into it.
+
+    Returns
+    -------
+    fresh : bool
+        Whether a complete stack is to be replaced.
+    already : bool
+        Whether everything is there.
+    """
+    found = stores.read_group(store / stores.STACK)
+    complete = found is not None and bool(found.get("complete"))
+    fits = stores.fitted_models(store)
+    if overwrite or not (complete or fits):
+        return complete, False
+    difference = "its photographs were removed" if found is None else job.difference(found)
+    if not difference:
+        return False, complete
+    lost = f"; the fits in it ({', '.join(fits)}) would go with it" if fits else ""
+    raise StoreError(
+        Problem(
+            where=str(store),
+            what=f"holds another stack: {difference}{lost}",
+            do="Choose another name for the store, or replace what is there with --overwrite",
+        )
+    )
+
+
+def _room(store: Path, job: _Job) -> list[Problem]:
+    """Return a problem if the disk cannot hold the stack beside what is there of it already."""
+    raw = float(np.prod(job.header.shape, dtype=np.float64)) * job.header.dtype.itemsize
+    there = stores.size_on_disk(store / stores.STACK)
+    share = _STORED_SHARE[job.capture.photographs[0].dtype.name]
+    return stores.no_room(store, int(raw * share) - there)
+
+
+class _StoppedError(Exception):
+    """A thread was told to stop; nobody sees this."""
+
+
+class _Job:
+    """The photographs of one call, and how they are decoded.
+
+    Parameters
+    ----------
+    capture : Capture
+    memory_bytes : float
+    show_progress : bool or None
+    """
+
+    def __init__(self, capture: Capture, memory_bytes: float, show_progress: bool | None) -> None:
+        self.capture = capture
+        self._show = show_progress
+        self._linearisations = linearisations(capture.photographs, capture.clip_level)
+        self.header = _header(capture, self._linearisations)
+        self.decoders = _decoders(capture.photographs, self._linearisations[0], memory_bytes)
+        self._stop = threading.Event()
+
+    def difference(self, found: dict[str, Any]) -> str:
+        """Return in words how a stack with attributes `found` differs from this one, "" if it does not."""
+        photographs = self.capture.photographs
+        names = {entry["name"] for entry in found["inputs"]}
+        more = len({photograph.name for photograph in photographs} - names)
+        fewer = len(names) - len(photographs) + more
+        if more or fewer:
+            return f"{fewer} of its photographs are not given now, and {more} are new"
+        if found["settings_sha256"] != self.header.attributes()["settings_sha256"]:
+            return "its lights, camera or settings were others"
+        count = len(photographs)
+        changed = set()
+        with progress("Comparing photographs", count, show=self._show) as advance:
+            for light, future in self._in_parallel(lambda light: self._sha256(photographs[light].path)):
+                advance(1)
+                if found["inputs"][light]["sha256"] not in (future.result(), None):
+                    changed.add(photographs[light].name)
+        some = ", ".join(sorted(changed)[:5])
+        return f"{len(changed)} of its photographs have changed ({some})" if changed else ""
+
+    def write(self, writer: stores.StackWriter) -> int:
+        """Decode and write what the store lacks; return how many photographs it had.
+
+        Raises
+        ------
+        CaptureError
+            Listing every photograph that cannot be decoded; the others are kept.
+        StoreError
+            If the store cannot be written.
+        """
+        count, height = self.header.shape[:2]
+        problems: dict[int, list[Problem]] = {}
+        kept = 0
+        with progress("Stacking photographs", count * height, show=self._show) as advance:
+            for light, future in self._in_parallel(lambda light: self._write_one(writer, light, advance)):
+                try:
+                    kept += future.result()
+                except CaptureError as error:
+                    problems[light] = error.problems
+        raise_problems(CaptureError, [problem for light in sorted(problems) for problem in problems[light]])
+        writer.finish()
+        return kept
+
+    def _in_parallel(self, function: Callable[[int], Result]) -> Iterator[tuple[int, Future[Result]]]:
+        """Call `function` with each photograph's number in threads; yield number and outcome as they come.
+
+        When the consumer stops early, by an error or Ctrl-C, the threads stop within a band.
+        """
+        with ThreadPoolExecutor(self.decoders, thread_name_prefix="decode") as pool:
+            futures = {pool.submit(function, light): light for light in range(len(self.capture.photographs))}
+            try:
+                for future in as_completed(futures):
+                    yield futures[future], future
+            except BaseException:
+                self._stop.set()
+                pool.shutdown(cancel_futures=True)
+                raise
+
+    def _sha256(self, path: Path) -> str:
+        """Return the SHA-256 of a file in hexadecimal.
+
+        Raises
+        ------
+        CaptureError
+            If it cannot be read.
+        """
+        digest = hashlib.sha256()
+        try:
+            with path.open("rb") as file:
+                while block := file.read(1 << 20):
+                    self._check_stop()
+                    digest.update(block)
+        except OSError as error:
+            what = f"cannot be read: {error.strerror}"
+            raise CaptureError(Problem(path.name, what, "Copy it again, or leave it out by name")) from error
+        return digest.hexdigest()
+
+    def _check_stop(self) -> None:
+        if self._stop.is_set():
+            raise _StoppedError
+
+    def _write_one(self, writer: stores.StackWriter, light: int, advance: Callable[[int], None]) -> bool:
+        """Write one photograph; return whether it was there already."""
+        photograph, linearise = self.capture.photographs[light], self._linearisations[light]
+        sha256 = self._sha256(photograph.path)
+        if writer.sha256[light] == sha256:
+            advance(photograph.height)
+            return True
+        writer.start_light(light)
+        clipped = 0
+        for row, band in photograph.bands(stores.STACK_CHUNK):
+            self._check_stop()
+            clipped += linearise.clipped_samples(band)
+            writer.write_band(light, row, linearise(band))
+            advance(len(band))
+        writer.finish_light(light, sha256, clipped)
+        return False
+
+
+def _header(capture: Capture, decoding: list[Linearisation]) -> stores.StackHeader:
+    """Return what the capture says about the stack before anything is decoded."""
+    first = capture.photographs[0]
+    kind = first.dtype.name
+    clip_level = np.min([each.clip_level for each in decoding], axis=0)
+    return stores.StackHeader(
+        shape=(len(capture.photographs), first.height, first.width, first.channels),
+        dtype=decoding[0].dtype,
+        lights=capture.lights,
+        camera=capture.camera,
+        scale=decoding[0].scale,
+        offset=0.0,
+        clip_level=tuple(float(level) if np.isfinite(level) else None for level in clip_level),
+        noise={**_NOISE[kind], **capture.noise},
+        inputs=[
+            {
+                "name": photograph.name,
+                "file": photograph.path.name,
+                "dtype": photograph.dtype.name,
+                "transfer": photograph.transfer,
+                "exposure_s": photograph.exposure_s,
+                "f_number": photograph.f_number,
+                "iso": photograph.iso,
+            }
+            for photograph in capture.photographs
+        ],
+        more={
+            "quantisation_step": max(each.step for each in decoding),
+            "light_file": {
+                "file": capture.light_file.name,
+                "sha256": hashlib.sha256(capture.light_file.read_bytes()).hexdigest(),
+            },
+            "notes": list(capture.notes),
+        },
+    )
+
+
+def _decoders(photographs: Sequence[Photograph], linearisation: Linearisation, memory_bytes: float) -> int:
+    """Return how many photographs to decode at a time: as many as there are cores, if memory allows."""
+    rows = stores.STACK_CHUNK
+    largest = max(
+        photograph.width
+        * photograph.channels
+        * (
+            # a band, and what the format makes a reader decode at once
+            (rows + max(rows, photograph.unit_rows)) * photograph.dtype.itemsize
+            # the band as stored, its chunks, and the chunks compressed
+            + 3 * rows * linearisation.dtype.itemsize
+        )
+        # compressed data on their way to the decoder
+        + photograph.path.stat().st_size
+        for photograph in photographs
+    )
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    affordable = int((memory_bytes - _BASE_BYTES) // largest)
+    return max(1, min(cores, affordable, len(photographs)))
