@@ -132,6 +132,23 @@ def test_golden_values(file, tolerance):
         assert specular[0] == pytest.approx(case["specular_basis"], rel=tolerance, abs=1e-12), case
 
 
+@pytest.mark.parametrize(
+    ("light", "view", "attenuation"),
+    [
+        ([0.0, 0.0, 1.0], [0.0, 0.0, 1.0], 1.0),
+        ([0.8, 0.0, 0.6], [0.0, 0.0, 1.0], 1.0),  # 2·0.6 > 1
+        ([0.96, 0.0, 0.28], [0.0, 0.0, 1.0], 0.56),  # h = (0.6, 0, 0.8): 2·0.8·0.28/0.8
+        ([0.0, 0.0, 1.0], [0.96, 0.0, 0.28], 0.56),
+        ([0.96, 0.0, 0.28], [-0.6, 0.0, 0.8], 14 / 15),  # h = (1, 0, 3)/√10: 2·3·0.28/1.8
+        ([0.0, 0.6, 0.8], [0.96, 0.0, 0.28], 42 / 85),  # h ∝ (0.96, 0.6, 1.08): 2·1.08·0.28/1.224
+    ],
+)
+def test_v_groove_attenuation_worked_out_by_hand(light, view, attenuation):
+    # D is 1 at c = 1 and F is 1 at an index of 1e9: what is left of the lobe is G/(n·v).
+    lobe = basis("torrance-sparrow", 1.0, [0.0, 0.0, 1.0], light, view, index=1e9)[1]
+    assert lobe[0] * view[2] == pytest.approx(attenuation, rel=1e-7)
+
+
 @pytest.mark.parametrize("model", MODELS)
 def test_float32_rendering_equals_the_reference(model):
     rng = np.random.default_rng(1)
