@@ -44,20 +44,14 @@ class Studio:
         return int(np.argmax(self.lights.direction[:, 2]))
 
 
-def write_calibration(folder: Path, studio: Studio) -> list[str]:
+def write_calibration(folder: Path, studio: Studio) -> None:
     """Write all calibration shots; those that an interrupted run has written stay.
 
     Parameters
     ----------
     folder : Path
     studio : Studio
-
-    Returns
-    -------
-    list of str
-        The files' names relative to `folder`.
     """
-    written = []
     tables: dict[str, Callable[[], str]] = {
         "grey_scale.csv": lambda: charts.grey_scale().table(),
         "colour_chart.csv": lambda: charts.colour_chart().table(),
@@ -66,14 +60,11 @@ def write_calibration(folder: Path, studio: Studio) -> list[str]:
     for name, table in tables.items():
         if not (folder / name).exists():
             write_text(folder / name, table())
-        written.append(name)
     for shot, (name, radiance) in enumerate(_shots(studio)):
         path = folder / (name + studio.ending)
         if not path.exists():
             rng = np.random.default_rng((studio.seed, 3, shot))
             write_image(path, studio.sensor.expose(radiance(), rng), studio.compression)
-        written.append(name + studio.ending)
-    return written
 
 
 def _shots(studio: Studio) -> Iterator[tuple[str, Callable[[], Array]]]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from os import PathLike
@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from impasto.capture.simulate import lamps
 from impasto.capture.simulate.calibration import Studio, write_calibration
 from impasto.capture.simulate.camera import Sensor
-from impasto.capture.simulate.files import ENDINGS, sweep, write_image, write_json, write_text
+from impasto.capture.simulate.files import ENDINGS, make_folder, sweep, write_image, write_json, write_text
 from impasto.capture.simulate.illumination import Scene
-from impasto.capture.simulate.manifest import light_positions, manifest
+from impasto.capture.simulate.manifest import manifest
 from impasto.capture.simulate.measured import read_measured
 from impasto.capture.simulate.painting.relief import Grid
 from impasto.capture.simulate.presets import PRESETS, SAMPLES, Order, paint_sample
@@ -26,6 +26,7 @@ from impasto.capture.simulate.settings import Settings
 from impasto.capture.simulate.truth import write_truth
 from impasto.errors import OptionError, Problem, raise_problems
 from impasto.geometry import Camera, Lights, tilt_direction
+from impasto.progress import progress
 
 MANIFEST = "capture.toml"
 _STARTED = "truth/settings.json"
@@ -33,8 +34,6 @@ BRACKET_STEP_EV = 2
 # Exposure time written beside the photographs; only ratios of exposure times have a meaning.
 _EXPOSURE_S = 0.1
 _TILT_OF_ARM_DEG = 5.0
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -53,11 +52,11 @@ class Simulation:
     brackets : int
         Further exposures of each.
     clipped_share : float
-        Share of the photographs' samples at full scale; NaN if all photographs came from an interrupted run.
+        Share of the samples at full scale, over the photographs taken in this run; NaN if all were there.
     shadowed_share : float
-        Share of pixels, over the lights, that see less than half of the light past the relief; NaN likewise.
+        Share of pixels that see less than half of the light past the relief, over the same photographs.
     files : int
-        All files written.
+        Files in the folder and those below it.
     """
 
     folder: Path
@@ -105,7 +104,7 @@ def simulate(
     bits: int | None = None,
     compression: str = "zstd",
     calibration: bool = True,
-    progress: Progress | None = None,
+    show_progress: bool | None = None,
 ) -> Simulation:
     """Simulate the capture of a painting.
 
@@ -171,8 +170,8 @@ def simulate(
         Of TIFF files.
     calibration : bool
         Whether calibration shots are taken.
-    progress : callable, optional
-        Called after each photograph with the number done and the number in all.
+    show_progress : bool, optional
+        Whether to show a progress bar; by default, if standard error is a terminal.
 
     Returns
     -------
@@ -182,7 +181,7 @@ def simulate(
     ------
     OptionError
         With everything that is wrong with the options, before anything is written.
-    CaptureError
+    OutputError
         If a file cannot be written.
 
     Notes
@@ -190,7 +189,7 @@ def simulate(
     Radiance is relative: 1 is a perfect white diffuser that a light of intensity 1 meets along its normal.
     Direct light only: there are no reflections from stroke to stroke, and relief causes no parallax.
     """
-    options = {key: value for key, value in locals().items() if key not in ("out", "progress")}
+    options = {key: value for key, value in locals().items() if key not in ("out", "show_progress")}
     if isinstance(options["measured"], PathLike):
         options["measured"] = Path(options["measured"])
     settings = Settings(**options)
@@ -203,41 +202,37 @@ def simulate(
     files = [name + ending for name in placed.names]
     exposures = _exposures(folder, settings)
     clipped, shadowed = [], []
-    for light, file in enumerate(files):
-        missing = [(ev, place / file) for ev, place in exposures if not (place / file).exists()]
-        if missing:
-            visible = scene.visible(placed, light)
-            shadowed.append(float(np.mean(visible < 0.5)))
-            radiance = scene.radiance(placed, light, visible)
+    with progress("Simulating photographs", len(files), show=show_progress) as advance:
+        for light, file in enumerate(files):
+            missing = [(ev, place / file) for ev, place in exposures if not (place / file).exists()]
+            if missing:
+                visible = scene.visible(placed, light)
+                shadowed.append(float(np.mean(visible < 0.5)))
+                radiance = scene.radiance(placed, light, visible)
             for ev, path in missing:
-                rng = np.random.default_rng((seed, 1, light, -ev))
-                image = sensor.expose(radiance, rng, ev)
+                image = sensor.expose(radiance, np.random.default_rng((seed, 1, light, -ev)), ev)
                 if ev == 0:
                     clipped.append(float(np.mean(image >= sensor.full_scale)))
                 write_image(path, image, compression)
-        if progress is not None:
-            progress(light + 1, len(files))
-    written = len(files) * len(exposures)
+            advance(1)
     if calibration:
         studio = Studio(placed, scene.camera, sensor, ending, compression, seed)
-        written += len(write_calibration(folder / "calibration", studio))
-    description = settings.as_json() | {
-        "painting": settings.painting,
-        "program": f"impasto {version('impasto')}",
-    }
-    written += len(write_truth(folder / "truth", scene, placed, files, description)) + 2
-    write_text(folder / "truth" / "lights.lp", light_positions(files, placed))
-    for ev, place in reversed(
-        exposures
-    ):  # the manifest of the folder itself comes last: it says all is there
+        write_calibration(folder / "calibration", studio)
+    write_truth(folder / "truth", scene, placed, files, _description(settings))
+    # The manifest of the folder itself comes last: it says that all is there.
+    for ev, place in reversed(exposures):
         text = manifest(files, placed, scene.camera, sensor, ev=ev, exposure_s=_EXPOSURE_S * 2.0**ev)
         write_text(place / MANIFEST, text)
     return Simulation(
-        folder, settings.painting, settings.size, len(files), settings.brackets,
-        float(np.mean(clipped)) if clipped else float("nan"),
-        (float(np.mean(shadowed)) if shadowed else float("nan")) if cast_shadows else 0.0,
-        written + len(exposures),
-    )  # fmt: skip
+        folder=folder,
+        painting=settings.painting,
+        size=settings.size,
+        photographs=len(files),
+        brackets=settings.brackets,
+        clipped_share=float(np.mean(clipped)) if clipped else float("nan"),
+        shadowed_share=float(np.mean(shadowed)) if shadowed else float("nan"),
+        files=sum(path.is_file() for path in folder.rglob("*")),
+    )
 
 
 def set_up(settings: Settings) -> tuple[Scene, Lights]:
@@ -315,14 +310,24 @@ def _folder_problems(folder: Path, settings: Settings) -> list[Problem]:
         return [Problem(str(folder), "is not empty, expected a new folder", "Give another name, or empty it")]
     if (folder / MANIFEST).exists():
         return [Problem(str(folder), "holds a finished simulation", "Give another name, or remove it")]
-    if started.get("fingerprint") != settings.fingerprint():
-        what = "holds an interrupted simulation with other options"
+    if started.get("fingerprint") != _fingerprint(settings):
+        what = "holds an interrupted simulation with other options, or by another version"
         return [Problem(str(folder), what, "Give the same options to go on, another name, or remove it")]
     return []
 
 
 def _start(folder: Path, settings: Settings) -> None:
     """Make the folder and note what it is for, so that an interrupted run can be taken up."""
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     sweep(folder)
-    write_json(folder / _STARTED, {"fingerprint": settings.fingerprint(), "settings": settings.as_json()})
+    write_json(folder / _STARTED, {"fingerprint": _fingerprint(settings), **_description(settings)})
+
+
+def _description(settings: Settings) -> dict[str, Any]:
+    program = f"impasto {version('impasto')}"
+    return {"program": program, "painting": settings.painting, "settings": settings.as_json()}
+
+
+def _fingerprint(settings: Settings) -> str:
+    """Return a hash that runs share which would write the same files."""
+    return hashlib.sha256(json.dumps(_description(settings), sort_keys=True).encode()).hexdigest()

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto.capture.simulate.materials import diffuse_term, dot, specular_term
+from impasto.capture.simulate.lamps import GOLDEN_ANGLE
+from impasto.capture.simulate.materials import diffuse_term, specular_term
 from impasto.capture.simulate.measured import MeasuredSet
 from impasto.capture.simulate.shadows import near_visibility, visibility
 from impasto.capture.simulate.surface import Surface
@@ -91,10 +92,10 @@ class Scene:
         view_direction = self._view(place)
         normal = surface.normal[rows].reshape(-1, 3).astype(np.float64)
         material = surface.material[rows].ravel()
-        out = surface.diffuse[rows].reshape(-1, 3) * diffuse_term(normal, light_direction)[:, None]
+        cosine = diffuse_term(normal, light_direction, view_direction)
+        out = surface.diffuse[rows].reshape(-1, 3) * cosine[:, None]
         if self.measured is not None:
-            cosine = surface.strength[rows].ravel() * diffuse_term(normal, light_direction)
-            cosine *= dot(normal, view_direction) > 0
+            cosine = surface.strength[rows].ravel() * cosine
             for number in np.unique(material):
                 here = _where(material == number)
                 brdf = self.measured.brdf(
@@ -163,7 +164,8 @@ def disc_directions(light_direction: Array, angular_size_deg: float) -> list[Arr
 
     Notes
     -----
-    Twelve places of equal area in two rings, which integrate a smooth lobe over the disc to a per cent.
+    A golden-angle spiral, whose places have equal shares of the disc. They lie about 0.3° apart, closer than
+    the narrowest lobes of paint are wide.
     """
     if angular_size_deg <= 0:
         return [light_direction]
@@ -171,14 +173,14 @@ def disc_directions(light_direction: Array, angular_size_deg: float) -> list[Arr
     first = np.cross(light_direction, helper)
     first /= np.linalg.norm(first, axis=-1, keepdims=True)
     second = np.cross(light_direction, first)
-    directions = []
-    radius = np.tan(np.radians(angular_size_deg) / 2)
-    # Four places in the inner third of the area, eight in the outer two thirds; radii halve each ring's area.
-    for number, share, turn in ((4, np.sqrt(1 / 6), 0.0), (8, np.sqrt(2 / 3), 0.3)):
-        for angle in turn + 2 * np.pi * np.arange(number) / number:
-            source = light_direction + radius * share * (np.cos(angle) * first + np.sin(angle) * second)
-            directions.append(source / np.linalg.norm(source, axis=-1, keepdims=True))
-    return directions
+    number = int(np.clip(8 * angular_size_deg**2, 12, 300))
+    reach = np.tan(np.radians(angular_size_deg) / 2) * np.sqrt((np.arange(number) + 0.5) / number)
+    turn = GOLDEN_ANGLE * np.arange(number)
+    sources = [
+        light_direction + r * (np.cos(t) * first + np.sin(t) * second)
+        for r, t in zip(reach, turn, strict=True)
+    ]
+    return [source / np.linalg.norm(source, axis=-1, keepdims=True) for source in sources]
 
 
 def _where(mask: NDArray[np.bool_]) -> slice | NDArray[np.bool_]:

@@ -13,7 +13,7 @@ ARM_COUNT, DOME_COUNT = 37, 48
 ARM_REACH_DEG = 72.0
 # A dome leaves a hole for the camera, and its lowest lights must clear the table.
 _DOME_ZENITH_DEG = (12.0, 76.0)
-_GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5.0))
+GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5.0))
 
 
 def arm_angles_deg(count: int = ARM_COUNT) -> Array:
@@ -30,7 +30,7 @@ def dome_directions(count: int = DOME_COUNT) -> Array:
     """
     top, bottom = np.cos(np.radians(_DOME_ZENITH_DEG))
     z = top + (bottom - top) * (np.arange(count) + 0.5) / count
-    azimuth = _GOLDEN_ANGLE * np.arange(count)
+    azimuth = GOLDEN_ANGLE * np.arange(count)
     across = np.sqrt(1 - z**2)
     return np.stack([across * np.cos(azimuth), across * np.sin(azimuth), z], axis=-1)
 

@@ -144,9 +144,10 @@ def specular_term(
     return np.where(seen, d * fresnel(l_h, index) * g / n_v, 0.0)
 
 
-def diffuse_term(normal: Array, light_direction: Array) -> Array:
-    """Return max(0, n·l), ndarray of shape (N,): Lambert's cosine, for a diffuse magnitude of 1."""
-    return np.maximum(dot(normal, light_direction), 0.0)
+def diffuse_term(normal: Array, light_direction: Array, view_direction: Array) -> Array:
+    """Return Lambert's cosine n·l, ndarray of shape (N,); 0 where the light or the camera is behind."""
+    n_l = dot(normal, light_direction)
+    return np.where((n_l > 0) & (dot(normal, view_direction) > 0), n_l, 0.0)
 
 
 def native_parameters(model: str, alpha: Array, kappa: Array) -> tuple[Array, Array]:

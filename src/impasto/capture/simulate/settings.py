@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
@@ -96,10 +94,6 @@ class Settings:
     def as_json(self) -> dict[str, Any]:
         """Return the settings as data for JSON."""
         return {field.name: _plain(getattr(self, field.name)) for field in fields(self)}
-
-    def fingerprint(self) -> str:
-        """Return a hash that equal settings share."""
-        return hashlib.sha256(json.dumps(self.as_json(), sort_keys=True).encode()).hexdigest()
 
     def problems(self) -> Iterator[Problem]:
         """Yield everything that is wrong with the settings."""

@@ -9,19 +9,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto.capture.simulate.camera import encode
-from impasto.capture.simulate.files import write_image, write_json
+from impasto.capture.simulate.files import write_image, write_json, write_text
 from impasto.capture.simulate.illumination import Scene
 from impasto.capture.simulate.lamps import named
+from impasto.capture.simulate.manifest import light_positions
 from impasto.capture.simulate.materials import SHAPES
 from impasto.capture.simulate.surface import Surface
-from impasto.geometry import Camera, Lights, dome_direction
+from impasto.colour import encode_srgb, quantise
+from impasto.geometry import Lights, dome_direction
+from impasto.images import write_png
 
 
 def write_truth(
-    folder: Path, scene: Scene, lights: Lights, files: Sequence[str], settings: dict[str, Any]
-) -> list[str]:
-    """Write the painting's true maps, its preview, and truth.json.
+    folder: Path, scene: Scene, lights: Lights, files: Sequence[str], asked: dict[str, Any]
+) -> None:
+    """Write the painting's true maps, a preview, the lights as an .lp file, and truth.json.
 
     Parameters
     ----------
@@ -30,21 +32,14 @@ def write_truth(
     lights : Lights
     files : sequence of str, length L
         The photographs' file names.
-    settings : dict
-        What the simulation was asked for.
-
-    Returns
-    -------
-    list of str
-        Names of the files in `folder`.
+    asked : dict
+        What the simulation was asked for, and which program did it.
     """
-    surface = scene.surface
-    maps = _maps(surface)
-    for name, image in maps.items():
+    for name, image in _maps(scene.surface).items():
         write_image(folder / f"{name}.exr", image)
-    write_image(folder / "preview.png", preview(scene))
-    write_json(folder / "truth.json", describe(surface, lights, scene.camera, files, settings))
-    return [*(f"{name}.exr" for name in maps), "preview.png", "truth.json"]
+    write_png(folder / "preview.png", preview(scene))
+    write_text(folder / "lights.lp", light_positions(files, lights))
+    write_json(folder / "truth.json", asked | describe(scene, lights, files))
 
 
 def _maps(surface: Surface) -> dict[str, NDArray[np.float32]]:
@@ -67,17 +62,15 @@ def preview(scene: Scene) -> NDArray[np.uint8]:
     """Return the painting under a lamp at the upper left and a weaker one near the camera, sRGB, 8 bits."""
     key = named(dome_direction(np.radians([58.0, 22.0]), np.radians([142.0, 70.0])))
     image = 0.95 * scene.radiance(key, 0) + 0.35 * scene.radiance(key, 1)
-    return np.rint(255 * encode(np.clip(image, 0, 1), "srgb")).astype(np.uint8)
+    return quantise(encode_srgb(image), np.uint8)
 
 
-def describe(
-    surface: Surface, lights: Lights, camera: Camera, files: Sequence[str], settings: dict[str, Any]
-) -> dict[str, Any]:
+def describe(scene: Scene, lights: Lights, files: Sequence[str]) -> dict[str, Any]:
     """Return all that is known about a simulation besides its maps, ready for JSON."""
+    surface, camera = scene.surface, scene.camera
     tilt = np.degrees(np.arccos(np.clip(surface.normal[..., 2], -1, 1)))
     counts = np.bincount(surface.material.ravel(), minlength=len(surface.materials))
     return {
-        "settings": settings,
         "camera": {
             "view_direction": camera.view_direction.tolist(),
             "distance_mm": camera.distance_mm,
