@@ -6,15 +6,8 @@ matter. Directions are unit vectors of shape (..., 3) that point away from the s
 
 References
 ----------
-[Chen2007] Chen, Berns, Taplin, "Model Evaluation for Computer Graphics Renderings of Artist Paint Surfaces",
-    Color Imaging Conference 15, 2007, pp. 54-59.
-[Torrance1967] Torrance, Sparrow, "Theory for Off-Specular Reflection From Roughened Surfaces", JOSA 57(9),
-    1967.
-[Blinn1977] Blinn, "Models of Light Reflection for Computer Synthesized Pictures", SIGGRAPH 1977.
-[Trowbridge1975] Trowbridge, Reitz, "Average Irregularity Representation of a Rough Surface for Ray
-    Reflection", JOSA 65(5), 1975.
-[Heitz2014] Heitz, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", JCGT 3(2), 2014.
-[Born1999] Born, Wolf, "Principles of Optics", 7th edition, section 1.5.
+[Chen2007], [TorranceSparrow1967], [Blinn1977], [TrowbridgeReitz1975], [Heitz2014], and [Born1999], section 1.5;
+in full in docs/references.md.
 """
 
 from __future__ import annotations
@@ -47,12 +40,12 @@ def unit(a):
 
 
 def trowbridge_reitz(n_h, c):
-    """D = [c² / ((n·h)² (c² − 1) + 1)]², 1 at n·h = 1 ([Trowbridge1975], [Chen2007] Eq. 3)."""
+    """D = [c² / ((n·h)² (c² − 1) + 1)]², 1 at n·h = 1 ([TrowbridgeReitz1975], [Chen2007] Eq. 3)."""
     return (c**2 / (n_h**2 * (c**2 - 1) + 1)) ** 2
 
 
 def gaussian(n_h, m):
-    """D = exp(−(δ/m)²), δ = acos(n·h) the facet's angle ([Torrance1967], [Blinn1977])."""
+    """D = exp(−(δ/m)²), δ = acos(n·h) the facet's angle ([TorranceSparrow1967], [Blinn1977])."""
     return np.exp(-((np.arccos(np.clip(n_h, -1, 1)) / m) ** 2))
 
 
@@ -65,7 +58,7 @@ def fresnel_dielectric(cos_incident, index):
 
 
 def v_groove(n_h, n_v, n_l, v_h):
-    """G = min(1, 2 (n·h)(n·v)/(v·h), 2 (n·h)(n·l)/(v·h)) ([Torrance1967], [Blinn1977])."""
+    """G = min(1, 2 (n·h)(n·v)/(v·h), 2 (n·h)(n·l)/(v·h)) ([TorranceSparrow1967], [Blinn1977])."""
     return np.minimum(1, np.minimum(2 * n_h * n_v / v_h, 2 * n_h * n_l / v_h))
 
 
