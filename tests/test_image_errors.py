@@ -1,5 +1,7 @@
 """The errors that bands add up to are those of the whole images."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from skimage.metrics import peak_signal_noise_ratio, structural_similarity
@@ -11,7 +13,7 @@ def gathered(photograph, rendering, clipped=None, bands=(0, 5, 6, 30, 64)):
     """Return the errors of two images with values in 0 to 1, shown as they are, fed in uneven bands."""
     clipped = np.zeros(photograph.shape, bool) if clipped is None else clipped
     accumulator = ErrorAccumulator(*photograph.shape)
-    for start, stop in zip(bands, bands[1:], strict=False):
+    for start, stop in pairwise(bands):
         rows = slice(start, stop)
         accumulator.add(photograph[rows], rendering[rows], photograph[rows], rendering[rows], clipped[rows])
     return accumulator.result()
