@@ -1,0 +1,335 @@
+"""Render a fitted painting under any light, tile by tile."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impasto import _core
+from impasto.animation import Animation
+from impasto.band_writers import BandWriter, prepare_folder
+from impasto.colour import encode_srgb
+from impasto.errors import OptionError, Problem
+from impasto.geometry import Camera, Lights, pixel_position_mm
+from impasto.models import parse_model
+from impasto.progress import progress
+from impasto.render_lights import requested_lights
+from impasto.store import Fit, open_fit, open_stack
+
+_BAND_BYTES = 192e6
+"""What the parameters of a band and its renderings may take; the rest of the process needs about 0.3 GB."""
+
+_BLOCK_ROWS = 256
+"""Rows of the store's inner chunks; bands of whole blocks decode each chunk once."""
+
+_LIGHTS_AT_A_TIME = 8
+_ANIMATED_FROM = 3
+
+
+@dataclass(frozen=True)
+class RenderSummary:
+    """What `render` did.
+
+    Parameters
+    ----------
+    out : Path
+        The folder with the pictures.
+    model : str
+        The model rendered.
+    lights : tuple of str
+        Names of the lights, which are the pictures' names.
+    files : tuple of Path
+        Every file written.
+    animation : Path or None
+        The animated picture of a sweep.
+    exposure : float
+        Factor on the radiance in the display pictures; 1 shows relative radiance 1 as white.
+    missing_pixels : int
+        Pixels without a fit: NaN in the EXR files, black on display.
+    matte_pixels : int
+        Pixels of which the highlight is not identified, rendered with their diffuse term alone.
+    too_bright : float
+        Largest share, over the lights, of samples that the display shows as white because they exceed it.
+    seconds : float
+    """
+
+    out: Path
+    model: str
+    lights: tuple[str, ...]
+    files: tuple[Path, ...]
+    animation: Path | None
+    exposure: float
+    missing_pixels: int
+    matte_pixels: int
+    too_bright: float
+    seconds: float
+
+
+def render(
+    store: str | PathLike[str],
+    *,
+    model: str,
+    lights: str | PathLike[str] | Lights | None = None,
+    light: Sequence[tuple[float, float]] = (),
+    arm: Sequence[float] = (),
+    out: str | PathLike[str],
+    exposure: float = 1.0,
+    raw: bool = False,
+    animate: bool | None = None,
+    show_progress: bool | None = None,
+) -> RenderSummary:
+    """Render a fit under lights, as one linear EXR file and one sRGB picture per light.
+
+    Memory is bounded whatever the painting's size: about 0.5 GB for pictures of up to 20 000 columns.
+
+    Parameters
+    ----------
+    store : path
+        Store with a fit of `model`.
+    model : str
+        Name of the model.
+    lights : path or Lights, optional
+        Light file (.lp, .csv, .toml), or lights.
+    light : sequence of (float, float), optional
+        Zenith and azimuth of single lights, degrees.
+    arm : sequence of float, optional
+        Arm angles, degrees.
+    out : path
+        Folder for the pictures, made if it is not there; pictures of the same names are replaced.
+    exposure : float, optional
+        Factor on the radiance in the display pictures. The EXR files are never scaled.
+    raw : bool, optional
+        Whether to write the EXR files only.
+    animate : bool, optional
+        Whether to write an animated picture too; by default, for three or more arm angles.
+    show_progress : bool, optional
+        Whether to show a progress bar; by default, if standard error is a terminal.
+
+    Returns
+    -------
+    RenderSummary
+
+    Raises
+    ------
+    OptionError
+        If the model, a light or the exposure cannot be used.
+    StoreError
+        If there is no such store or no such complete fit.
+    OutputError
+        If the pictures cannot be written.
+    """
+    started = time.perf_counter()
+    spec = parse_model(model)
+    if not 0 < exposure < np.inf:
+        raise OptionError(
+            Problem(f"--exposure {exposure:g}", "is not above 0", "Give a factor such as 2 or 0.5")
+        )
+    fit = open_fit(Path(store), spec.name)
+    stack = open_stack(Path(store))
+    _, height, width, channels = stack.shape
+    if isinstance(lights, Lights):
+        wanted = lights
+    else:
+        wanted = requested_lights(lights, light, arm, channels, stack.camera)
+    folder = prepare_folder(out)
+    animate = len(arm) >= _ANIMATED_FROM if animate is None else animate
+    animation = Animation(folder / f"{spec.name}.webp", height, width) if animate and not raw else None
+    files: list[Path] = []
+    too_bright = 0.0
+    missing = matte = 0
+    with progress("render", len(wanted) * height, show=show_progress) as advance:
+        for first in range(0, len(wanted), _LIGHTS_AT_A_TIME):
+            index = range(first, min(first + _LIGHTS_AT_A_TIME, len(wanted)))
+            group = wanted.select(index)
+            missing = matte = 0
+            with _Pictures(folder, group.names, fit.shape, channels, spec.title, exposure, raw) as pictures:
+                for band in render_bands(fit, group, stack.camera):
+                    missing += band.missing_pixels
+                    matte += band.matte_pixels
+                    for number, radiance in enumerate(band.radiance):
+                        pictures.write(number, radiance)
+                        if animation:
+                            animation.add(first + number, band.rows, radiance, exposure)
+                        advance(radiance.shape[0])
+            files += pictures.files
+            too_bright = max(too_bright, pictures.too_bright)
+    if animation:
+        animation.save()
+        files.append(animation.path)
+    return RenderSummary(
+        out=folder,
+        model=spec.name,
+        lights=wanted.names,
+        files=tuple(files),
+        animation=animation.path if animation else None,
+        exposure=exposure,
+        missing_pixels=missing,
+        matte_pixels=matte,
+        too_bright=too_bright,
+        seconds=time.perf_counter() - started,
+    )
+
+
+class _Pictures(ExitStack):
+    """The files of a few lights, open at once; each is there in the end whole or not at all."""
+
+    def __init__(
+        self,
+        folder: Path,
+        names: Sequence[str],
+        shape: tuple[int, int],
+        channels: int,
+        title: str,
+        exposure: float,
+        raw: bool,
+    ) -> None:
+        super().__init__()
+        self._exposure = exposure
+        self._white = np.zeros(len(names))
+        self._samples = shape[0] * shape[1] * channels
+        letters = ("R", "G", "B") if channels == 3 else ("Y",)
+
+        def writer(name: str, ending: str) -> BandWriter:
+            path = folder / f"{name}{ending}"
+            return self.enter_context(BandWriter(path, *shape, letters, f"{title}, light {name}"))
+
+        try:
+            self._linear = [writer(name, ".exr") for name in names]
+            self._display = [] if raw else [writer(name, ".png") for name in names]
+        except BaseException:
+            self.__exit__(*sys.exc_info())
+            raise
+
+    @property
+    def files(self) -> list[Path]:
+        return [writer.path for writer in (*self._linear, *self._display)]
+
+    @property
+    def too_bright(self) -> float:
+        return float(self._white.max()) / self._samples
+
+    def write(self, light: int, radiance: NDArray[np.float32]) -> None:
+        self._linear[light].write(radiance)
+        if self._display:
+            self._display[light].write(encode_srgb(radiance, self._exposure))
+            self._white[light] += np.count_nonzero(radiance * self._exposure > 1.0)
+
+
+@dataclass(frozen=True)
+class Band:
+    """Rows of a rendering.
+
+    Parameters
+    ----------
+    rows : slice
+        Which rows.
+    radiance : ndarray of shape (L, rows, W, C), float32
+        Relative radiance under each light, NaN where there is no fit.
+    missing_pixels, matte_pixels : int
+        Pixels without a fit, and those rendered with their diffuse term alone.
+    """
+
+    rows: slice
+    radiance: NDArray[np.float32]
+    missing_pixels: int
+    matte_pixels: int
+
+
+def render_bands(fit: Fit, lights: Lights, camera: Camera) -> Iterator[Band]:
+    """Render a fit under lights, in bands of rows from top to bottom.
+
+    A pixel whose highlight the photographs do not identify (status 5) is rendered without one.
+
+    Parameters
+    ----------
+    fit : Fit
+        A complete fit.
+    lights : Lights
+        The lights.
+    camera : Camera
+        The camera of the photographs.
+
+    Yields
+    ------
+    Band
+
+    Raises
+    ------
+    StoreError
+        If a map is damaged.
+    """
+    spec = parse_model(fit.attributes["model"])
+    height, width = fit.shape
+    light_rgb = np.asarray(fit.attributes["light_rgb"], dtype=np.float64)
+    channels = len(light_rgb)
+    names = ["normal", "diffuse", *spec.shape_names]
+    names += ["specular"] if spec.lobes else []
+    names += ["ambient"] if spec.ambient else []
+    step = _band_rows(
+        width, 8 + 2 * channels + spec.lobes + len(spec.shape_names) + 3 * channels * len(lights)
+    )
+    near = lights.near or camera.distance_mm is not None
+    for top in range(0, height, step):
+        rows = slice(top, min(top + step, height))
+        maps = fit.read(rows, slice(0, width), names)
+        pixels = (rows.stop - rows.start) * width
+        flat = {name: np.ascontiguousarray(values.reshape(pixels, -1)) for name, values in maps.items()}
+        normal, diffuse = flat["normal"], flat["diffuse"]
+        specular = flat.get("specular", np.empty((pixels, 0), np.float32))
+        shape = np.concatenate(
+            [np.empty((pixels, 0), np.float32), *(flat[name] for name in spec.shape_names)], axis=1
+        )
+        missing = ~np.isfinite(normal).all(axis=1)
+        matte = ~missing & ~(np.isfinite(specular).all(axis=1) & np.isfinite(shape).all(axis=1))
+        specular[matte], shape[matte] = 0.0, 1.0
+        radiance = _core.render(
+            spec.name,
+            normal,
+            diffuse,
+            specular,
+            shape,
+            flat.get("ambient"),
+            light_direction=lights.direction,
+            light_position_mm=lights.position_mm,
+            light_intensity=np.ascontiguousarray(np.broadcast_to(lights.intensity, (len(lights), channels))),
+            view_direction=camera.view_direction,
+            camera_distance_mm=camera.distance_mm,
+            position_mm=_position(rows, fit.shape, camera) if near else None,
+            light_rgb=light_rgb,
+            index=fit.attributes["index_of_refraction"],
+            fresnel=fit.attributes["fresnel"],
+        )
+        yield Band(
+            rows=rows,
+            radiance=radiance.reshape(len(lights), rows.stop - rows.start, width, channels),
+            missing_pixels=int(missing.sum()),
+            matte_pixels=int(matte.sum()),
+        )
+
+
+def _position(rows: slice, shape: tuple[int, int], camera: Camera) -> NDArray[np.float32]:
+    if camera.mm_per_px is None:
+        raise OptionError(
+            Problem(
+                where="render",
+                what="a light or the camera is near, and the stack does not say how large a pixel is",
+                do="State mm_per_px under [camera] in the photographs' TOML file and stack them again",
+            )
+        )
+    return pixel_position_mm(rows, slice(0, shape[1]), *shape, camera.mm_per_px)
+
+
+def _band_rows(width: int, floats_per_pixel: int) -> int:
+    """Return how many rows a band may have: whole blocks of the store, or a part of one for wide pictures."""
+    rows = int(_BAND_BYTES / (4 * floats_per_pixel * width))
+    if rows >= _BLOCK_ROWS:
+        return rows // _BLOCK_ROWS * _BLOCK_ROWS
+    return max(32, 1 << max(rows, 1).bit_length() - 1)
