@@ -19,6 +19,7 @@ _DPI = 100
 _SHORTEST_PX = 900
 _MISSING = "#d7d3cb"
 _INK = "#22201c"
+_TEXT_PT = 13
 
 # Okabe and Ito's palette, which stays distinct for the common colour deficiencies [OkabeIto2008]_; the usual
 # outcome is the quiet one.
@@ -63,7 +64,7 @@ def draw_values(
         low = float(finite.min()) if finite.size else high / 10
     if high <= low:
         high = low * 1.01 if low > 0 else low + 1.0
-    figure, axes, side = _canvas(values.shape[0], values.shape[1], title, side_px=150)
+    figure, axes, side = _canvas(values.shape[0], values.shape[1], title, side_px=200)
     colour_map = colormaps["cividis" if uncertainty else "viridis"].with_extremes(bad=_MISSING)
     shown = np.where(np.isfinite(values), np.clip(values, low, high), np.nan)
     norm = LogNorm(low, high) if logarithmic else Normalize(low, high)
@@ -75,9 +76,10 @@ def draw_values(
         (box.x0 + box.width * 0.12, box.y0 + box.height * 0.1, box.width * 0.16, box.height * 0.86)
     )
     colour_bar = figure.colorbar(
-        image, cax=bar, extend=extend[below, above], format="%.3g" if logarithmic else None
+        image, cax=bar, extend=extend[below, above], format="%g" if logarithmic else None
     )
-    colour_bar.set_label(label, color=_INK)
+    colour_bar.set_label(label, color=_INK, fontsize=_TEXT_PT)
+    bar.tick_params(labelsize=_TEXT_PT)
     if not np.isfinite(values).all():
         _legend(side, [(_MISSING, "no value")])
     _save(figure, path)
@@ -95,7 +97,7 @@ def draw_normal(path: Path, normal: NDArray[np.floating], *, title: str) -> None
     title : str
         Heading of the picture.
     """
-    figure, axes, side = _canvas(normal.shape[0], normal.shape[1], title, side_px=190)
+    figure, axes, side = _canvas(normal.shape[0], normal.shape[1], title, side_px=240)
     axes.imshow(_normal_colours(normal), interpolation="nearest")
     y, x = np.mgrid[1:-1:121j, -1:1:121j]
     sphere = np.stack([x, y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], axis=-1)
@@ -112,7 +114,7 @@ def draw_normal(path: Path, normal: NDArray[np.floating], *, title: str) -> None
         ((-5, 60), "left", "right", "center"),
         ((126, 60), "right", "left", "center"),
     ):
-        key.text(*position, text, ha=ha, va=va, fontsize=9, color=_INK)
+        key.text(*position, text, ha=ha, va=va, fontsize=_TEXT_PT, color=_INK)
     if not np.isfinite(normal).all():
         _legend(side, [(_MISSING, "no value")])
     _save(figure, path)
@@ -136,9 +138,9 @@ def draw_colour(path: Path, image_linear: NDArray[np.floating], *, title: str, e
     missing = ~np.isfinite(image_linear).all(axis=-1)
     image = np.repeat(image, 3, axis=-1) if image.shape[-1] == 1 else image
     image[missing] = _rgb(_MISSING)
-    figure, axes, side = _canvas(image.shape[0], image.shape[1], title, side_px=130)
+    figure, axes, side = _canvas(image.shape[0], image.shape[1], title, side_px=170)
     axes.imshow(image, interpolation="nearest")
-    side.text(0.1, 1.0, f"white is {1 / exposure:.3g}\nand above", va="top", fontsize=10, color=_INK)
+    side.text(0.1, 1.0, f"white is {1 / exposure:.3g}\nand above", va="top", fontsize=_TEXT_PT, color=_INK)
     if missing.any():
         _legend(side, [(_MISSING, "no value")])
     _save(figure, path)
@@ -168,7 +170,7 @@ def draw_status(
         How many pixels of the whole map have each code.
     """
     palette = np.array([_rgb(colour) for colour in _STATUS_COLOURS])
-    figure, axes, side = _canvas(status.shape[0], status.shape[1], title, side_px=240)
+    figure, axes, side = _canvas(status.shape[0], status.shape[1], title, side_px=300)
     axes.imshow(palette[np.clip(status, 0, len(palette) - 1)], interpolation="nearest")
     total = max(sum(counts.values()), 1)
     entries = [
@@ -221,7 +223,7 @@ def _canvas(height: int, width: int, title: str, side_px: int) -> tuple[Figure, 
 
     factor = max(1, round(_SHORTEST_PX / max(height, width)))
     map_height, map_width = height * factor, width * factor
-    top, edge = 44, 14
+    top, edge = 52, 14
     total_height = max(map_height, 260) + top + edge
     total_width = map_width + side_px + 2 * edge
     figure = Figure(figsize=(total_width / _DPI, total_height / _DPI), dpi=_DPI, facecolor="white")
@@ -231,7 +233,7 @@ def _canvas(height: int, width: int, title: str, side_px: int) -> tuple[Figure, 
         (edge / total_width, bottom / total_height, map_width / total_width, map_height / total_height)
     )
     axes.set_axis_off()
-    figure.text(edge / total_width, 1 - 14 / total_height, title, va="top", fontsize=12, color=_INK)
+    figure.text(edge / total_width, 1 - 14 / total_height, title, va="top", fontsize=_TEXT_PT + 2, color=_INK)
     side = figure.add_axes(
         (
             (edge + map_width + 10) / total_width,
@@ -256,6 +258,7 @@ def _legend(axes: Axes, entries: Sequence[tuple[str, str]], top: bool = False) -
         borderaxespad=0,
         labelspacing=0.9,
         labelcolor=_INK,
+        fontsize=_TEXT_PT,
     )
 
 
