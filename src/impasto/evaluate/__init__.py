@@ -1,0 +1,246 @@
+"""Judge renderings by photographs that the fit has not seen."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, fields, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from impasto.colour import encode_srgb
+from impasto.errors import OptionError, Problem
+from impasto.evaluate.errors import ErrorAccumulator, ImageErrors
+from impasto.evaluate.held_out import listed_lights, named_lights, spread_lights
+from impasto.fit import FitOptions, fit
+from impasto.geometry import Lights, zenith_azimuth
+from impasto.models import parse_model
+from impasto.progress import progress
+from impasto.render import render_bands
+from impasto.store import Fit, Stack, fit_attributes, fitted_models, open_fit, open_stack
+from impasto.store.borrow import borrowed_stack
+
+__all__ = ["EvaluateSummary", "ImageErrors", "LightErrors", "ModelErrors", "evaluate"]
+
+_DEFAULT_MODELS = ("torrance-sparrow", "phong")
+_DEFAULT_HELD_OUT = 5
+
+
+@dataclass(frozen=True)
+class LightErrors:
+    """The errors under one light.
+
+    Parameters
+    ----------
+    name : str
+        The photograph's name.
+    zenith_deg, azimuth_deg : float
+        Where the light stood.
+    errors : ImageErrors
+        How far the rendering is from the photograph.
+    """
+
+    name: str
+    zenith_deg: float
+    azimuth_deg: float
+    errors: ImageErrors
+
+
+@dataclass(frozen=True)
+class ModelErrors:
+    """The errors of one model.
+
+    Parameters
+    ----------
+    model : str
+        The model's name.
+    procedure : str
+        How it was fitted.
+    refitted : bool
+        Whether it was fitted anew without the held-out photographs; false where the fit in the store had not
+        seen them anyway.
+    lights : tuple of LightErrors
+        One entry per held-out photograph.
+    mean : ImageErrors
+        The mean over them.
+    """
+
+    model: str
+    procedure: str
+    refitted: bool
+    lights: tuple[LightErrors, ...]
+    mean: ImageErrors
+
+
+@dataclass(frozen=True)
+class EvaluateSummary:
+    """What `evaluate` found.
+
+    Parameters
+    ----------
+    store : Path
+        The store.
+    held_out : tuple of str
+        Photographs that no fit has seen.
+    fitted : int
+        Photographs that the fits have seen.
+    models : tuple of ModelErrors
+        One entry per model.
+    seconds : float
+    """
+
+    store: Path
+    held_out: tuple[str, ...]
+    fitted: int
+    models: tuple[ModelErrors, ...]
+    seconds: float
+
+
+def evaluate(
+    store: str | PathLike[str],
+    *,
+    models: Sequence[str] = (),
+    held_out: int | None = None,
+    held_out_lights: str | PathLike[str] | Sequence[str] | None = None,
+    show_progress: bool | None = None,
+) -> EvaluateSummary:
+    """Render photographs that were kept out of the fit, and compare.
+
+    Each model is fitted again without these photographs, with the options of its fit in the store, into a
+    temporary store; the fits in the store stay as they are. Where the fit in the store was made without them,
+    it is judged itself.
+
+    Parameters
+    ----------
+    store : path
+        Store with a stack.
+    models : sequence of str, optional
+        Models to judge; by default those fitted in the store, or Torrance-Sparrow and Phong.
+    held_out : int, optional
+        How many photographs to hold out, spread in elevation; 5 by default, fewer where there are few.
+    held_out_lights : path or sequence of str, optional
+        Which photographs to hold out instead: a file that names them, or their names.
+    show_progress : bool, optional
+        Whether to show progress bars; by default, if standard error is a terminal.
+
+    Returns
+    -------
+    EvaluateSummary
+
+    Raises
+    ------
+    OptionError
+        If both ways to choose photographs are used, a name is unknown, or no photographs are left to fit.
+    StoreError
+        If the stack is missing, unfinished or damaged.
+    """
+    started = time.perf_counter()
+    path = Path(store)
+    specs = [parse_model(name) for name in models or fitted_models(path) or _DEFAULT_MODELS]
+    stack = open_stack(path)
+    held = _held_out(stack.lights, held_out, held_out_lights)
+    names = tuple(stack.lights.names[index] for index in held)
+    results = []
+    with ExitStack() as keep:
+        borrowed: Path | None = None
+        for spec in specs:
+            procedure, options = _settings(path, spec.name)
+            unseen = spec.name in fitted_models(path) and set(names) <= set(options.exclude)
+            source = path
+            if not unseen:
+                borrowed = borrowed or keep.enter_context(borrowed_stack(path))
+                source = borrowed
+                blind = replace(options, exclude=tuple(sorted({*options.exclude, *names})))
+                fit(
+                    source,
+                    models=[spec.name],
+                    procedure=procedure,
+                    options=blind,
+                    show_progress=show_progress,
+                )
+            errors = _compare(open_fit(source, spec.name), stack, held, show_progress)
+            results.append(
+                ModelErrors(
+                    model=spec.name,
+                    procedure=procedure,
+                    refitted=not unseen,
+                    lights=errors,
+                    mean=_mean([entry.errors for entry in errors]),
+                )
+            )
+    return EvaluateSummary(
+        store=path,
+        held_out=names,
+        fitted=len(stack.lights) - len(held),
+        models=tuple(results),
+        seconds=time.perf_counter() - started,
+    )
+
+
+def _held_out(
+    lights: Lights, count: int | None, chosen: str | PathLike[str] | Sequence[str] | None
+) -> list[int]:
+    if count is not None and chosen is not None:
+        raise OptionError(
+            Problem(
+                where="--held-out and --held-out-lights",
+                what="both choose photographs, and one of them is expected",
+                do="Leave one of them out",
+            )
+        )
+    if chosen is None:
+        usual = min(_DEFAULT_HELD_OUT, max(1, len(lights) // 4))
+        return spread_lights(lights, usual if count is None else count)
+    if isinstance(chosen, str | PathLike):
+        return named_lights(chosen, lights.names)
+    return listed_lights([(f"held-out photograph {name}", name) for name in chosen], lights.names)
+
+
+def _settings(store: Path, model: str) -> tuple[str, FitOptions]:
+    """Return the procedure and the options of the fit in the store, or the default ones."""
+    found: dict[str, Any] | None = fit_attributes(store, model)
+    if not found:
+        return "joint", FitOptions()
+    options = {**found["options"], "exclude": tuple(found["options"]["exclude"])}
+    return found["procedure"], FitOptions(
+        index=found["index_of_refraction"], fresnel=found["fresnel"], **options
+    )
+
+
+def _compare(
+    fitted: Fit, stack: Stack, held: Sequence[int], show_progress: bool | None
+) -> tuple[LightErrors, ...]:
+    """Render the held-out lights and compare them with their photographs, band by band."""
+    lights = stack.lights.select(np.asarray(held))
+    _, height, width, channels = stack.shape
+    gathered = [ErrorAccumulator(height, width, channels) for _ in held]
+    with progress(f"Comparing {fitted.attributes['model']}", height, show=show_progress) as advance:
+        for band in render_bands(fitted, lights, stack.camera):
+            photographs = stack.radiance(band.rows, slice(0, width), held)
+            for photograph, rendering, errors in zip(photographs, band.radiance, gathered, strict=True):
+                errors.add(
+                    photograph,
+                    rendering,
+                    encode_srgb(photograph),
+                    encode_srgb(rendering),
+                    photograph >= stack.clip_level,
+                )
+            advance(band.rows.stop - band.rows.start)
+    zenith, azimuth = np.degrees(zenith_azimuth(lights.direction))
+    return tuple(
+        LightErrors(name, float(zenith[index]), float(azimuth[index]), gathered[index].result())
+        for index, name in enumerate(lights.names)
+    )
+
+
+def _mean(errors: Sequence[ImageErrors]) -> ImageErrors:
+    return ImageErrors(
+        **{
+            field.name: float(np.mean([getattr(entry, field.name) for entry in errors]))
+            for field in fields(ImageErrors)
+        }
+    )

@@ -1,0 +1,101 @@
+"""Held-out errors come from fits that have not seen the photographs."""
+
+import shutil
+import sys
+
+import numpy as np
+import pytest
+import tifffile
+
+import impasto
+from impasto.errors import OptionError
+from impasto.fit import FitOptions
+
+MODEL = "torrance-sparrow"
+HELD = ("light-003", "light-009")
+# The package; as an attribute of impasto, the name is the function.
+MODULE = sys.modules["impasto.evaluate"]
+
+
+def listing(folder):
+    return sorted((path, path.stat().st_mtime_ns) for path in folder.rglob("*") if path.is_file())
+
+
+def test_the_store_and_its_neighbourhood_stay_as_they_are(painting):
+    before = listing(painting.parent)
+    impasto.evaluate(painting, models=["phong"], held_out=1)
+    assert listing(painting.parent) == before
+
+
+def test_held_out_photographs_do_not_enter_the_fit(capture, painting, tmp_path, monkeypatch):
+    """Another picture in their place changes what is compared with, and not the renderings."""
+    photos = tmp_path / "photos"
+    shutil.copytree(capture, photos)
+    for name in HELD:
+        image = tifffile.imread(photos / f"{name}.tif")
+        tifffile.imwrite(photos / f"{name}.tif", image[::-1, ::-1] // 3, photometric="rgb")
+    spoilt = tmp_path / "spoilt.zarr"
+    impasto.stack(photos, spoilt)
+
+    rendered = []
+    original = MODULE.render_bands
+
+    def spy(*arguments):
+        for band in original(*arguments):
+            rendered.append(band.radiance)
+            yield band
+
+    monkeypatch.setattr(MODULE, "render_bands", spy)
+    clean = impasto.evaluate(painting, models=[MODEL], held_out_lights=HELD)
+    other = impasto.evaluate(spoilt, models=[MODEL], held_out_lights=[f"{name}.tif" for name in HELD])
+    np.testing.assert_array_equal(rendered[0], rendered[1])
+    assert clean.held_out == other.held_out == HELD
+    assert clean.fitted == 14
+    for before, after in zip(clean.models[0].lights, other.models[0].lights, strict=True):
+        assert before.errors.psnr_db > after.errors.psnr_db + 5
+
+
+def test_a_fit_that_has_not_seen_them_is_judged_itself(painting, tmp_path):
+    store = tmp_path / "p.zarr"
+    shutil.copytree(painting, store)
+    shutil.rmtree(store / "fits")
+    impasto.fit(store, models=[MODEL], options=FitOptions(exclude=HELD))
+    (judged,) = impasto.evaluate(store, held_out_lights=HELD).models
+    (refitted,) = impasto.evaluate(painting, models=[MODEL], held_out_lights=HELD).models
+    assert (judged.refitted, refitted.refitted) == (False, True)
+    assert judged.lights == refitted.lights
+    # It has seen this one.
+    assert impasto.evaluate(store, held_out_lights=[*HELD, "light-000"]).models[0].refitted
+
+
+def test_the_options_of_the_fit_in_the_store_are_kept(painting, tmp_path, monkeypatch):
+    store = tmp_path / "p.zarr"
+    shutil.copytree(painting, store)
+    shutil.rmtree(store / "fits")
+    options = FitOptions(loss="cauchy", index=1.6, exclude=("light-001",))
+    impasto.fit(store, models=[MODEL], options=options)
+    used = []
+    original = MODULE.fit
+
+    def spy(path, **arguments):
+        used.append((path, arguments["options"]))
+        return original(path, **arguments)
+
+    monkeypatch.setattr(MODULE, "fit", spy)
+    impasto.evaluate(store, held_out_lights=HELD)
+    ((path, blind),) = used
+    assert path != store
+    assert (blind.loss, blind.index) == ("cauchy", 1.6)
+    assert set(blind.exclude) == {"light-001", *HELD}
+
+
+def test_errors_are_small_where_the_model_is_the_truth(painting):
+    (model,) = impasto.evaluate(painting, models=[MODEL], held_out=3).models
+    assert model.mean.psnr_db > 30
+    assert model.mean.ssim > 0.95
+    assert model.mean.predicted > 0.99
+
+
+def test_one_way_to_choose_is_enough(painting):
+    with pytest.raises(OptionError, match="one of them is expected"):
+        impasto.evaluate(painting, held_out=2, held_out_lights=HELD)
