@@ -10,7 +10,7 @@ import os
 import platform
 import sys
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -49,7 +49,12 @@ class Report:
         """Print a line of the result."""
         typer.echo(text)
 
-    def table(self, header: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+    def say_all(self, lines: Iterable[str]) -> None:
+        """Print lines of the result."""
+        for line in lines:
+            self.say(line)
+
+    def table(self, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """Print rows in aligned columns: the first flush left, the others flush right."""
         widths = [max(len(row[index]) for row in [header, *rows]) for index in range(len(header))]
         for row in [header, *rows]:

@@ -1,0 +1,328 @@
+"""The command line: one subcommand per stage, in the order of the pipeline."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import impasto
+from impasto.console import reporting
+from impasto.errors import OptionError, Problem
+from impasto.fit import PROCEDURES, FitOptions
+from impasto.render_lights import parse_angles, parse_light
+from impasto.summaries import (
+    evaluate_tables,
+    fit_lines,
+    maps_lines,
+    model_lines,
+    render_lines,
+    seconds,
+    simulation_lines,
+    stack_lines,
+)
+
+app = typer.Typer(
+    name="impasto",
+    help="Measure how a painted surface reflects light, from photographs under a moving light, and show it "
+    "under any light.\n\nPHOTOS is a folder of photographs with their light directions; STORE is the folder "
+    "that holds everything measured from them, by custom named after the painting: painting.zarr.",
+    epilog="Start with: impasto stack photos/ painting.zarr && impasto fit painting.zarr",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Json = Annotated[
+    Path | None, typer.Option("--json", metavar="FILE", help="Write what is printed to FILE, as data.")
+]
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an unexpected error.")]
+Store = Annotated[Path, typer.Argument(metavar="STORE", help="The folder that impasto stack made.")]
+Model = Annotated[str, typer.Option("--model", metavar="NAME", help="Reflectance model; see impasto models.")]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files; made if needed.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what is there.")]
+
+
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"impasto {impasto.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _impasto(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Show the version.", is_eager=True, callback=_tell_version),
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command(epilog="Example: impasto simulate photos/ --preset still-life --dome --size 768,512")
+def simulate(
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder to make.")],
+    sample: Annotated[
+        str | None, typer.Option("--sample", metavar="a..h", help="One of the paper's eight samples.")
+    ] = None,
+    preset: Annotated[
+        str | None, typer.Option("--preset", metavar="NAME", help="still-life (default) or swatches.")
+    ] = None,
+    arm: Annotated[bool, typer.Option("--arm", help="Lights on an arm in one plane.")] = False,
+    dome: Annotated[bool, typer.Option("--dome", help="Lights all around.")] = False,
+    lights: Annotated[
+        int | None, typer.Option("--lights", metavar="N", help="How many lights; 37 or 48 by default.")
+    ] = None,
+    size: Annotated[str, typer.Option("--size", metavar="W,H", help="Width and height, pixels.")] = "512,512",
+    seed: Annotated[int, typer.Option("--seed", metavar="N", help="Another painting of the kind.")] = 0,
+    brackets: Annotated[
+        int, typer.Option("--brackets", metavar="N", help="Shorter exposures of each photograph.")
+    ] = 0,
+    model: Annotated[
+        str | None, typer.Option("--model", metavar="NAME", help="Model of the painting's highlights.")
+    ] = None,
+    measured: Annotated[
+        Path | None, typer.Option("--measured", metavar="FILE", help="Use measured materials (.npz).")
+    ] = None,
+    exposure: Annotated[
+        float, typer.Option("--exposure", metavar="SHARE", help="Value of white, as share of full scale.")
+    ] = 0.25,
+    format: Annotated[str, typer.Option("--format", metavar="KIND", help="tiff, png, jpeg or exr.")] = "tiff",
+    bits: Annotated[int | None, typer.Option("--bits", metavar="N", help="8 or 16.")] = None,
+    noise: Annotated[bool, typer.Option("--noise/--no-noise", help="Whether the sensor is noisy.")] = True,
+    shadows: Annotated[
+        bool, typer.Option("--shadows/--no-shadows", help="Whether the relief casts shadows.")
+    ] = True,
+    json: Json = None,
+    debug: Debug = False,
+) -> None:
+    """Simulate photographs of a painting of which the truth is known."""
+    with reporting("simulate", json, debug) as report:
+        summary = impasto.simulate(
+            out,
+            sample=sample,
+            preset=preset,
+            arm=arm,
+            dome=dome,
+            lights=lights,
+            size=_size(size),
+            seed=seed,
+            brackets=brackets,
+            model=model,
+            measured=measured,
+            exposure=exposure,
+            format=format,
+            bits=bits,
+            noise=noise,
+            cast_shadows=shadows,
+        )
+        report.say_all(simulation_lines(summary))
+        report.done(summary)
+
+
+@app.command(epilog="Example: impasto stack photos/ painting.zarr --lights dirs.lp --exclude blurred07")
+def stack(
+    photos: Annotated[Path, typer.Argument(metavar="PHOTOS", help="Folder with the photographs.")],
+    store: Annotated[Path, typer.Argument(metavar="STORE", help="Folder to make, such as painting.zarr.")],
+    lights: Annotated[
+        Path | None,
+        typer.Option("--lights", metavar="FILE", help="Light file; by default the one in PHOTOS."),
+    ] = None,
+    exclude: Annotated[
+        list[str] | None,
+        typer.Option("--exclude", metavar="NAME", help="Photograph to leave out; may be repeated."),
+    ] = None,
+    overwrite: Overwrite = False,
+    json: Json = None,
+    debug: Debug = False,
+) -> None:
+    """Read photographs and their lights into a store."""
+    with reporting("stack", json, debug) as report:
+        summary = impasto.stack(photos, store, lights=lights, exclude=exclude or (), overwrite=overwrite)
+        report.say_all(stack_lines(summary))
+        report.say(f"next: impasto fit {store}")
+        report.done(summary)
+
+
+@app.command(epilog="Example: impasto fit painting.zarr --model torrance-sparrow --loss cauchy")
+def fit(
+    store: Store,
+    model: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--model", metavar="NAME", help="May be repeated; torrance-sparrow and phong by default."
+        ),
+    ] = None,
+    procedure: Annotated[
+        str, typer.Option("--procedure", metavar="NAME", help=f"{' or '.join(PROCEDURES)}.")
+    ] = "joint",
+    index: Annotated[
+        float, typer.Option("--index", metavar="N", help="Index of refraction of the surface.")
+    ] = FitOptions.index,
+    fresnel: Annotated[
+        str, typer.Option("--fresnel", metavar="WHICH", help="Angle of incidence: facet or element.")
+    ] = FitOptions.fresnel,
+    loss: Annotated[
+        str, typer.Option("--loss", metavar="KIND", help="linear, or robust: cauchy or huber.")
+    ] = FitOptions.loss,
+    loss_scale: Annotated[
+        float, typer.Option("--loss-scale", metavar="N", help="Where a robust loss sets in, in sigmas.")
+    ] = FitOptions.loss_scale,
+    shadow_level: Annotated[
+        float | None,
+        typer.Option("--shadow-level", metavar="Y", help="Leave out samples darker than this radiance."),
+    ] = FitOptions.shadow_level,
+    exclude: Annotated[
+        list[str] | None,
+        typer.Option("--exclude", metavar="NAME", help="Photograph to leave out; may be repeated."),
+    ] = None,
+    overwrite: Overwrite = False,
+    json: Json = None,
+    debug: Debug = False,
+) -> None:
+    """Fit reflectance models to every pixel of a stack."""
+    with reporting("fit", json, debug) as report:
+        options = FitOptions(
+            index=index,
+            fresnel=fresnel,
+            loss=loss,
+            loss_scale=loss_scale,
+            shadow_level=shadow_level,
+            exclude=tuple(exclude or ()),
+        )
+        more: dict[str, Any] = {"models": tuple(model)} if model else {}
+        summary = impasto.fit(store, procedure=procedure, options=options, overwrite=overwrite, **more)
+        report.say_all(fit_lines(summary))
+        report.say(f"next: impasto maps {store} --model {summary.models[0].model} --out maps/")
+        report.done(summary)
+
+
+@app.command(epilog="Example: impasto render painting.zarr --model phong --arm -60:60:5 --out film/")
+def render(
+    store: Store,
+    model: Model,
+    out: Out,
+    lights: Annotated[
+        Path | None, typer.Option("--lights", metavar="FILE", help="Light file (.lp, .csv, .toml).")
+    ] = None,
+    light: Annotated[
+        list[str] | None,
+        typer.Option("--light", metavar="ZENITH,AZIMUTH", help="One light, degrees; may be repeated."),
+    ] = None,
+    arm: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--arm",
+            metavar="DEG",
+            help="Light on the arm, degrees, or a sweep START:STOP:STEP; may be repeated.",
+        ),
+    ] = None,
+    exposure: Annotated[
+        float, typer.Option("--exposure", metavar="N", help="Brighten the display pictures N times.")
+    ] = 1.0,
+    raw: Annotated[bool, typer.Option("--raw", help="Write the linear EXR files only.")] = False,
+    animate: Annotated[
+        bool | None,
+        typer.Option("--animate/--no-animate", help="Write an animated picture; by default for sweeps."),
+    ] = None,
+    json: Json = None,
+    debug: Debug = False,
+) -> None:
+    """Render the painting under any light."""
+    with reporting("render", json, debug) as report:
+        summary = impasto.render(
+            store,
+            model=model,
+            lights=lights,
+            light=[parse_light(text) for text in light or ()],
+            arm=parse_angles(arm or ()),
+            out=out,
+            exposure=exposure,
+            raw=raw,
+            animate=animate,
+        )
+        report.say_all(render_lines(summary))
+        report.done(summary)
+
+
+@app.command(epilog="Example: impasto maps painting.zarr --model torrance-sparrow --out maps/")
+def maps(store: Store, model: Model, out: Out, json: Json = None, debug: Debug = False) -> None:
+    """Write the measured maps as pictures and as numbers."""
+    with reporting("maps", json, debug) as report:
+        summary = impasto.maps(store, model=model, out=out)
+        report.say_all(maps_lines(summary))
+        report.done(summary)
+
+
+@app.command(epilog="Example: impasto evaluate painting.zarr --held-out 5")
+def evaluate(
+    store: Store,
+    held_out: Annotated[
+        int | None,
+        typer.Option("--held-out", metavar="K", help="How many photographs to hold out; 5 by default."),
+    ] = None,
+    held_out_lights: Annotated[
+        Path | None,
+        typer.Option("--held-out-lights", metavar="FILE", help="Names of photographs, or a light file."),
+    ] = None,
+    model: Annotated[
+        list[str] | None,
+        typer.Option("--model", metavar="NAME", help="May be repeated; those in the store by default."),
+    ] = None,
+    json: Json = None,
+    debug: Debug = False,
+) -> None:
+    """Compare renderings with photographs that the fit has not seen."""
+    with reporting("evaluate", json, debug) as report:
+        summary = impasto.evaluate(
+            store, models=model or (), held_out=held_out, held_out_lights=held_out_lights
+        )
+        report.say(f"{len(summary.held_out)} photographs held out, {summary.fitted} fitted")
+        for heading, header, rows in evaluate_tables(summary):
+            report.say()
+            report.say(heading)
+            report.table(header, rows)
+        report.done(summary)
+
+
+@app.command(epilog="Example: impasto models")
+def models(json: Json = None, debug: Debug = False) -> None:
+    """List the reflectance models."""
+    with reporting("models", json, debug) as report:
+        for spec in impasto.models.MODELS.values():
+            report.say_all(model_lines(spec))
+        report.say()
+        report.say("The papers behind them are listed in docs/references.md.")
+        report.done({"models": list(impasto.models.MODELS.values())})
+
+
+@app.command(epilog="Example: impasto demo demo/")
+def demo(
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder to make.")] = Path("demo"),
+    json: Json = None,
+    debug: Debug = False,
+) -> None:
+    """Run everything on a small simulated painting, and write a page about it."""
+    with reporting("demo", json, debug) as report:
+        summary = impasto.demo(out, say=report.say)
+        report.say()
+        report.say(f"everything took {seconds(summary.seconds)}; open this page in a browser:")
+        report.say(f"    {summary.page.resolve()}")
+        report.done(summary)
+
+
+def _size(text: str) -> tuple[int, int]:
+    try:
+        width, height = (int(part) for part in text.replace("x", ",").split(","))
+    except ValueError:
+        raise OptionError(
+            Problem(f"--size {text}", "is not two whole numbers", "Write width and height: --size 768,512")
+        ) from None
+    return width, height
+
+
+def main() -> None:
+    """Run the command line."""
+    app()

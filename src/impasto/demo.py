@@ -1,0 +1,164 @@
+"""The whole pipeline on a small simulated painting, with a page that shows what came out."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from impasto.capture.simulate import simulate
+from impasto.demo_page import DemoSummary, write_page
+from impasto.errors import OutputError, Problem
+from impasto.evaluate import evaluate
+from impasto.evaluate.held_out import spread_lights
+from impasto.fit import FitOptions, fit
+from impasto.maps import maps
+from impasto.render import render
+from impasto.stack import stack
+from impasto.store import open_stack
+from impasto.summaries import evaluate_tables, fit_lines, stack_lines
+
+MODELS = ("torrance-sparrow", "phong")
+_SIZE = (480, 360)
+_LIGHTS = 45
+_HELD_OUT = 5
+_SWEEP_DEG = tuple(range(-66, 67, 6))
+# What an earlier demo left, and nothing else, may be replaced.
+_PARTS = ("photos", "painting.zarr", "painting.zarr.log.jsonl", "renderings", "maps", "index.html")
+_MARK = "demo.txt"
+
+
+def demo(
+    out: str | PathLike[str] = "demo",
+    *,
+    size: tuple[int, int] = _SIZE,
+    say: Callable[[str], None] = lambda line: None,
+    show_progress: bool | None = None,
+) -> DemoSummary:
+    """Simulate a painting, stack, fit two models, render, evaluate, and write a page about it.
+
+    Parameters
+    ----------
+    out : path, optional
+        Folder to make. What an earlier demo left there is replaced.
+    size : (int, int), optional
+        Width and height of the simulated photographs, pixels.
+    say : callable, optional
+        Called with lines that tell what is going on.
+    show_progress : bool, optional
+        Whether to show progress bars; by default, if standard error is a terminal.
+
+    Returns
+    -------
+    DemoSummary
+
+    Raises
+    ------
+    OutputError
+        If `out` holds something that is not a demo's.
+    """
+    started = time.perf_counter()
+    folder = _clear(Path(out))
+    photos, store = folder / "photos", folder / "painting.zarr"
+    clock = _Clock(say)
+    with clock.step("simulate", f"simulate {photos} --dome --lights {_LIGHTS} --size {size[0]},{size[1]}"):
+        simulated = simulate(photos, dome=True, lights=_LIGHTS, size=size)
+        say(f"{simulated.photographs} photographs of a still life that does not exist")
+    with clock.step("stack", f"stack {photos} {store}"):
+        stacked = stack(photos, store, show_progress=show_progress)
+        for line in stack_lines(stacked):
+            say(line)
+    lights = open_stack(store).lights
+    held = lights.select(np.asarray(spread_lights(lights, _HELD_OUT)))
+    listed = folder / "held-out.txt"
+    listed.write_text("\n".join(held.names) + "\n", encoding="utf-8")
+    with clock.step("fit", f"fit {store} " + " ".join(f"--exclude {name}" for name in held.names)):
+        options = FitOptions(exclude=held.names)
+        fitted = fit(store, models=MODELS, options=options, show_progress=show_progress)
+        for line in fit_lines(fitted):
+            say(line)
+    with clock.step("evaluate", f"evaluate {store} --held-out-lights {listed}"):
+        evaluated = evaluate(store, models=MODELS, held_out_lights=held.names, show_progress=show_progress)
+        for heading, header, rows in evaluate_tables(evaluated):
+            say(f"{heading}: " + ", ".join(f"{header[k]} {rows[-1][k]}" for k in (2, 3, 4)))
+    # A photograph's own light has the photograph's exposure; pictures are brightened by as much.
+    exposure = 1 / float(held.intensity.max())
+    sweep = f"{_SWEEP_DEG[0]}:{_SWEEP_DEG[-1]}:{_SWEEP_DEG[1] - _SWEEP_DEG[0]}"
+    renderings = folder / "renderings"
+    with clock.step("render", f"render {store} --model {MODELS[0]} --arm {sweep} --out {renderings}/sweep"):
+        rendered = [
+            render(
+                store,
+                model=model,
+                lights=held,
+                out=renderings / model,
+                exposure=exposure,
+                show_progress=show_progress,
+            )
+            for model in MODELS
+        ]
+        rendered.append(
+            render(
+                store, model=MODELS[0], arm=_SWEEP_DEG, out=renderings / "sweep", show_progress=show_progress
+            )
+        )
+    with clock.step("maps", f"maps {store} --model {MODELS[0]} --out {folder}/maps/{MODELS[0]}"):
+        mapped = [
+            maps(store, model=model, out=folder / "maps" / model, show_progress=show_progress)
+            for model in MODELS
+        ]
+    summary = DemoSummary(
+        page=folder / "index.html",
+        store=store,
+        stacked=stacked,
+        fitted=fitted,
+        evaluated=evaluated,
+        rendered=tuple(rendered),
+        mapped=tuple(mapped),
+        exposure=exposure,
+        steps=clock.seconds,
+        seconds=time.perf_counter() - started,
+    )
+    write_page(summary, photos / "truth")
+    return replace(summary, seconds=time.perf_counter() - started)
+
+
+class _Clock:
+    """Announce steps as the commands that do the same, and take their time."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def step(self, name: str, command: str) -> Iterator[None]:
+        self._say(f"\n$ impasto {command}")
+        started = time.perf_counter()
+        yield
+        self.seconds[name] = time.perf_counter() - started
+
+
+def _clear(folder: Path) -> Path:
+    """Make the folder, or empty it of an earlier demo."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())) and not (folder / _MARK).is_file():
+        raise OutputError(
+            Problem(
+                where=str(folder),
+                what="is not empty and was not made by impasto demo",
+                do="Give the name of a new folder",
+            )
+        )
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / _MARK).write_text("Made by impasto demo, which may replace what is here.\n", encoding="utf-8")
+    for part in _PARTS:
+        if (folder / part).is_dir():
+            shutil.rmtree(folder / part)
+        else:
+            (folder / part).unlink(missing_ok=True)
+    return folder

@@ -1,0 +1,142 @@
+"""What each stage says when it is done, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from impasto.capture.simulate import Simulation
+from impasto.evaluate import EvaluateSummary
+from impasto.fit import FitSummary, ModelFit
+from impasto.maps import MapsSummary
+from impasto.models import ModelSpec
+from impasto.render import RenderSummary
+from impasto.stack import StackSummary
+
+Row = Sequence[str]
+
+
+def simulation_lines(summary: Simulation) -> Iterator[str]:
+    """Yield what `simulate` made."""
+    width, height = summary.size
+    yield f"{summary.painting}: {_count(summary.photographs, 'photograph')} of {width} x {height} px"
+    if summary.brackets:
+        yield f"{_count(summary.brackets, 'shorter exposure')} of each, in brackets/"
+    if summary.clipped_share == summary.clipped_share:
+        yield f"clipped: {percent(summary.clipped_share)} of the samples"
+        yield f"in cast shadow: {percent(summary.shadowed_share)} of the pixels, over all lights"
+    yield f"{summary.folder} is ready, with the truth in {summary.folder / 'truth'}"
+
+
+def stack_lines(summary: StackSummary) -> Iterator[str]:
+    """Yield what `stack` read, assumed and wrote."""
+    yield (
+        f"{_count(summary.photographs, 'photograph')} of {summary.width} x {summary.height} px, "
+        f"{_count(summary.channels, 'channel')}, decoded as {summary.transfer}"
+    )
+    if summary.already:
+        yield "all of them were in the store before"
+    elif summary.kept:
+        yield f"{summary.kept} of them were in the store before"
+    samples = summary.photographs * summary.width * summary.height * summary.channels
+    clipped = sum(summary.clipped_samples.values())
+    yield f"clipped: {percent(clipped / samples)} of the samples; they will not enter a fit"
+    yield from (f"note: {note}" for note in summary.notes)
+    yield f"{summary.store} is ready ({seconds(summary.seconds)})"
+
+
+def fit_lines(summary: FitSummary) -> Iterator[str]:
+    """Yield how the pixels of each model ended."""
+    yield (
+        f"{summary.width} x {summary.height} px under {_count(summary.photographs, 'light')}, "
+        f"procedure {summary.procedure}"
+    )
+    for model in summary.models:
+        yield f"{model.model}: {_how(model)}"
+        total = max(sum(model.pixels.values()), 1)
+        yield from (f"    {meaning}: {percent(count / total)}" for meaning, count in model.pixels.items())
+    yield from (f"note: {note}" for note in summary.notes)
+    yield f"{summary.store} is ready ({seconds(summary.seconds)})"
+
+
+def _how(model: ModelFit) -> str:
+    if model.already:
+        return "was in the store before, with the same options"
+    speed = f"{model.pixels_per_second:,.0f} pixels per second"
+    return f"{seconds(model.seconds)}, {speed}{', continued from an earlier run' * model.continued}"
+
+
+def render_lines(summary: RenderSummary) -> Iterator[str]:
+    """Yield what `render` wrote, and what the display pictures cannot show."""
+    kinds = " and ".join(sorted({path.suffix[1:].upper() for path in summary.files} - {"WEBP"}))
+    yield f"{_count(len(summary.lights), 'rendering')} of {summary.model} in {summary.out} as {kinds}"
+    if summary.animation:
+        yield f"animated (8-bit sRGB): {summary.animation}"
+    if summary.too_bright > 0:
+        yield (
+            f"brighter than the display can show: up to {percent(summary.too_bright)} of a picture's samples "
+            f"at exposure {summary.exposure:g}; the EXR files hold them"
+        )
+    if summary.missing_pixels:
+        yield f"{_count(summary.missing_pixels, 'pixel')} without a fit: missing in EXR, black on display"
+    if summary.matte_pixels:
+        yield f"{_count(summary.matte_pixels, 'pixel')} without an identified highlight: rendered matte"
+
+
+def maps_lines(summary: MapsSummary) -> Iterator[str]:
+    """Yield what `maps` wrote."""
+    yield f"{_count(len(summary.maps), 'map')} of {summary.model} in {summary.out}"
+    yield "each as float EXR, 16-bit TIFF and a picture with its legend; maps.json says what the codes mean"
+    total = max(sum(summary.status.values()), 1)
+    yield from (f"    {meaning}: {percent(count / total)}" for meaning, count in summary.status.items())
+
+
+def evaluate_tables(summary: EvaluateSummary) -> Iterator[tuple[str, Row, list[Row]]]:
+    """Yield for each model a heading, the columns' names, and a row per held-out light and for the mean."""
+    header = ("held-out light", "zenith", "PSNR dB", "SSIM", "RMS / mean")
+    for model in summary.models:
+        rows: list[Row] = [
+            (
+                entry.name,
+                f"{entry.zenith_deg:.1f}°",
+                f"{entry.errors.psnr_db:.2f}",
+                f"{entry.errors.ssim:.4f}",
+                f"{entry.errors.rms_relative:#.4g}",
+            )
+            for entry in model.lights
+        ]
+        mean = model.mean
+        rows.append(("mean", "", f"{mean.psnr_db:.2f}", f"{mean.ssim:.4f}", f"{mean.rms_relative:#.4g}"))
+        how = "fitted again without them" if model.refitted else "the fit in the store has not seen them"
+        yield f"{model.model} ({model.procedure}; {how})", header, rows
+
+
+def model_lines(spec: ModelSpec) -> Iterator[str]:
+    """Yield a model's name, what it is, its shape parameters and its sources."""
+    yield spec.name
+    yield f"    {spec.title} [{', '.join(spec.citations)}]"
+    for parameter in spec.shape:
+        yield f"    {parameter.name}: {parameter.meaning}, {parameter.lower:g} to {parameter.upper:g}"
+
+
+def seconds(value: float) -> str:
+    """Return a duration as a person would say it."""
+    if value < 90:
+        return f"{value:.1f} s"
+    return f"{value / 60:.0f} min" if value < 5400 else f"{value / 3600:.1f} h"
+
+
+def percent(share: float) -> str:
+    """Return a share in per cent, never rounding something to nothing."""
+    if share == 0:
+        return "0 %"
+    return f"{100 * share:.2f} %" if share >= 0.0001 else "under 0.01 %"
+
+
+def status_rows(pixels: Mapping[str, int]) -> list[Row]:
+    """Return a row per status, with its share of the pixels."""
+    total = max(sum(pixels.values()), 1)
+    return [(meaning, f"{count:,}", percent(count / total)) for meaning, count in pixels.items()]
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number:,} {what}" + ("" if number == 1 else "s")
