@@ -6,8 +6,8 @@ matter. Directions are unit vectors of shape (..., 3) that point away from the s
 
 References
 ----------
-[Chen2007], [TorranceSparrow1967], [Blinn1977], [TrowbridgeReitz1975], [Heitz2014], and [Born1999], section 1.5;
-in full in docs/references.md.
+[Chen2007], [TorranceSparrow1967], [Blinn1977], [TrowbridgeReitz1975], [Heitz2014], and [Born1999], section
+1.5; in full in docs/references.md.
 """
 
 from __future__ import annotations
