@@ -73,7 +73,8 @@ def test_the_design_does_not_depend_on_the_number_of_pixels(still_life):
     fine = PRESETS["still-life"](order(320))
     coarse = fine.diffuse.reshape(160, 2, 160, 2, 3).mean(axis=(1, 3))
     assert np.corrcoef(coarse.ravel(), still_life.diffuse.ravel())[0, 1] > 0.95
-    assert np.median(tilt_deg(fine)) == pytest.approx(np.median(tilt_deg(still_life)), rel=0.35)
+    heights = fine.height_mm.reshape(160, 2, 160, 2).mean(axis=(1, 3))
+    assert np.corrcoef(heights.ravel(), still_life.height_mm.ravel())[0, 1] > 0.9
 
 
 def test_a_wide_format_shows_more_wall_and_table_around_the_same_scene(still_life):

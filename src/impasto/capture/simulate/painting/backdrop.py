@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from impasto.capture.simulate.painting.brushwork import around, scatter, tone, vary
+from impasto.capture.simulate.painting.brushwork import around, scatter, tone, underpaint, vary
 from impasto.capture.simulate.painting.paints import mix
 from impasto.capture.simulate.painting.relief import Grid
 from impasto.capture.simulate.painting.strokes import Stroke
@@ -53,6 +53,8 @@ def disc(grid: Grid, rng: np.random.Generator) -> Iterator[Stroke]:
     gold = mix(("shell gold", 1.0))
     pale = mix(("shell gold", 0.7), ("lead-tin yellow", 0.3))
     red = mix(("burnt sienna", 0.7), ("vermilion", 0.3))
+    levels = np.arange(1.5 - radius, radius - 1, 2.2)
+    yield from underpaint(((x0, y0 + y, np.sqrt(radius**2 - y**2)) for y in levels), 3.6, "shell gold", gold)
     rings = [(radius + 0.4, 3.0, 0.10, "burnt sienna", red, red)]
     rings += [(r, 3.3, 0.12, "shell gold", gold, pale) for r in np.arange(radius - 1.5, 1.0, -2.3)]
     for r, width, thickness, paint, colour, streak in rings:

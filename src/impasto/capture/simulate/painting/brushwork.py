@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 from numpy.typing import NDArray
+
+from impasto.capture.simulate.painting.strokes import Stroke
 
 Array = NDArray[np.float64]
 
@@ -42,6 +46,23 @@ def vary(rng: np.random.Generator, colour: Array, amount: float = 0.10) -> Array
     """Return an albedo as the next load of the brush brings it, lighter or darker by about `amount`."""
     drift = rng.standard_normal() + 0.4 * rng.standard_normal(3)
     return np.asarray(np.clip(colour * np.exp(amount * drift), 0, 0.92))
+
+
+def underpaint(
+    chords: Iterable[tuple[float, float, float]], width: float, paint: str, colour: Array
+) -> Iterator[Stroke]:
+    """Yield thin level strokes that fill a shape, so that nothing behind it shows between later strokes.
+
+    Parameters
+    ----------
+    chords : iterable of (x, y, half_length)
+        The shape's chords, closer together than `width`.
+    width : float
+    paint : str
+    colour : ndarray of shape (3,)
+    """
+    for x, y, half_length in chords:
+        yield Stroke((x, y, 0.0), (1.96 * half_length, width, 0.05), paint, (colour, colour), dryness=0.0)
 
 
 def around(radius: float, length: float) -> float:

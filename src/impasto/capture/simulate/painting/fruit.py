@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from impasto.capture.simulate.painting.brushwork import Ramp, around, scatter, tone, vary
+from impasto.capture.simulate.painting.brushwork import Ramp, around, scatter, tone, underpaint, vary
 from impasto.capture.simulate.painting.paints import mix
 from impasto.capture.simulate.painting.strokes import Stroke
 
@@ -62,6 +62,14 @@ def _ball(
     x0, y0, tilt = place
     rx, ry = radii
     small, large = min(radii), max(radii)
+    # The chords of a tilted ellipse are centred off its axis.
+    high = np.hypot(rx * np.sin(tilt), ry * np.cos(tilt))
+    lean = (rx**2 - ry**2) * np.sin(tilt) * np.cos(tilt) / high**2
+    chords = (
+        (x0 + lean * y, y0 + y, rx * ry / high * np.sqrt(1 - (y / high) ** 2))
+        for y in np.arange(0.8 - high, high - 0.4, 1.5)
+    )
+    yield from underpaint(chords, 2.4, paint, tone(0.35, ramp))
     broad, fine = (
         [
             (p, q, width, thickness)

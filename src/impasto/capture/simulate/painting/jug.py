@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from impasto.capture.simulate.painting.brushwork import scatter, tone, vary
+from impasto.capture.simulate.painting.brushwork import scatter, tone, underpaint, vary
 from impasto.capture.simulate.painting.paints import mix
 from impasto.capture.simulate.painting.strokes import Stroke
 
@@ -61,6 +61,8 @@ def _handle(rng: np.random.Generator) -> Iterator[Stroke]:
 
 def _body(rng: np.random.Generator) -> Iterator[Stroke]:
     """Strokes down the flanks, modelled from a light at the upper left."""
+    levels = np.arange(LIP_Y + 0.6, FOOT_Y - 0.6, 1.6)
+    yield from underpaint(((AXIS_X, y, _radius(y)) for y in levels), 2.6, "ultramarine", LOCAL)
     for thickness, step, width in ((0.10, (3.6, 4.0), 4.6), (0.18, (2.5, 3.4), 2.9)):
         for x, y in scatter(rng, (-15, 15), (LIP_Y + 1, FOOT_Y - 1.2), step):
             across = x / _radius(y)
