@@ -61,7 +61,7 @@ def trowbridge_reitz(n_h: Array, c: Array) -> Array:
 
     References
     ----------
-    [Trowbridge1975]_; [Chen2007]_, Eq. 3.
+    [TrowbridgeReitz1975]_; [Chen2007]_, Eq. 3.
     """
     return np.asarray((c**2 / (n_h**2 * (c**2 - 1) + 1)) ** 2)
 
@@ -71,7 +71,7 @@ def gaussian(n_h: Array, m: Array) -> Array:
 
     References
     ----------
-    [Torrance1967]_; [Blinn1977]_.
+    [TorranceSparrow1967]_; [Blinn1977]_.
     """
     return np.asarray(np.exp(-((np.arccos(np.minimum(n_h, 1.0)) / m) ** 2)))
 
@@ -81,7 +81,7 @@ def v_groove(n_l: Array, n_v: Array, n_h: Array, v_h: Array) -> Array:
 
     References
     ----------
-    [Torrance1967]_; [Blinn1977]_.
+    [TorranceSparrow1967]_; [Blinn1977]_.
     """
     return np.asarray(np.minimum(1.0, 2 * n_h * np.minimum(n_v, n_l) / v_h))
 
