@@ -36,7 +36,7 @@ $(VENV)/.installed: requirements/dev.txt
 	touch $@
 
 $(VENV)/.built: $(VENV)/.installed pyproject.toml $(CORE)
-	. $(BIN)/activate && maturin develop --quiet --release --locked
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	touch $@
 
 # Lock files hold versions and hashes, never download addresses. Needs uv.

@@ -1,1 +1,20 @@
-//! The numerical core of impasto: numbers in, numbers out.
+//! The numerical core of impasto: numbers in, numbers out. No files, and no Python types but in `python`.
+
+// Lanes and channels are walked by index side by side; zipped iterators hide that and vectorise worse.
+#![allow(clippy::needless_range_loop)]
+
+mod arrow;
+mod dispatch;
+mod dual;
+mod geometry;
+mod joint;
+mod lanes;
+mod minimise;
+pub mod models;
+mod number;
+mod observations;
+mod python;
+mod record;
+mod render;
+mod separable;
+mod start;

@@ -1,0 +1,295 @@
+//! The linear part of a reflectance model: magnitudes that are least squares given normal and shape.
+//!
+//! Diffuse (and ambient) magnitudes belong to one channel each, specular magnitudes to all of them. The normal equations
+//! are therefore an arrow: a block per channel, bordered by the lobes. Eliminating the blocks leaves a system of the size
+//! of the number of lobes.
+
+use crate::lanes::{Lane, LaneMask};
+use crate::minimise::solve_symmetric;
+use crate::models::MAX_LOBES;
+use crate::number::{Mask, Number, Real, array};
+
+/// A vector shaped like the magnitudes: (diffuse, ambient) per channel, then one number per lobe.
+#[derive(Clone, Copy)]
+pub struct Magnitudes<const FMA: bool, const C: usize> {
+    pub diffuse: [Lane<FMA>; C],
+    pub ambient: [Lane<FMA>; C],
+    pub specular: [Lane<FMA>; MAX_LOBES],
+}
+
+impl<const FMA: bool, const C: usize> Magnitudes<FMA, C> {
+    #[inline(always)]
+    pub fn zero() -> Self {
+        let zero = Lane::splat(0.0);
+        Magnitudes { diffuse: [zero; C], ambient: [zero; C], specular: [zero; MAX_LOBES] }
+    }
+
+    #[inline(always)]
+    pub fn dot(&self, other: &Self) -> Lane<FMA> {
+        let mut sum = Lane::splat(0.0);
+        for k in 0..C {
+            sum = self.diffuse[k].mul_add(other.diffuse[k], sum);
+            sum = self.ambient[k].mul_add(other.ambient[k], sum);
+        }
+        for j in 0..MAX_LOBES {
+            sum = self.specular[j].mul_add(other.specular[j], sum);
+        }
+        sum
+    }
+}
+
+/// Which magnitudes are free; the others are held at 0.
+#[derive(Clone, Copy)]
+pub struct Free<const C: usize> {
+    pub diffuse: [LaneMask; C],
+    pub ambient: [LaneMask; C],
+    pub specular: [LaneMask; MAX_LOBES],
+}
+
+impl<const C: usize> Free<C> {
+    #[inline(always)]
+    pub fn new(lobes: usize, ambient: bool) -> Self {
+        Free {
+            diffuse: [LaneMask::ALL; C],
+            ambient: [if ambient { LaneMask::ALL } else { LaneMask::NONE }; C],
+            specular: array!(|j| if j < lobes { LaneMask::ALL } else { LaneMask::NONE }),
+        }
+    }
+}
+
+/// Weighted sums of products of the basis functions over the lights, for one channel.
+#[derive(Clone, Copy)]
+struct ChannelSums<const FMA: bool> {
+    diffuse_diffuse: Lane<FMA>,
+    diffuse_one: Lane<FMA>,
+    one_one: Lane<FMA>,
+    diffuse_specular: [Lane<FMA>; MAX_LOBES],
+    one_specular: [Lane<FMA>; MAX_LOBES],
+}
+
+/// The normal equations of the magnitudes: a matrix and a right-hand side.
+#[derive(Clone, Copy)]
+pub struct Arrow<const FMA: bool, const C: usize> {
+    channel: [ChannelSums<FMA>; C],
+    specular_specular: [[Lane<FMA>; MAX_LOBES]; MAX_LOBES],
+    /// Projections of the data on the basis functions.
+    pub right: Magnitudes<FMA, C>,
+}
+
+impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
+    #[inline(always)]
+    pub fn zero() -> Self {
+        let zero = Lane::splat(0.0);
+        let sums = ChannelSums {
+            diffuse_diffuse: zero,
+            diffuse_one: zero,
+            one_one: zero,
+            diffuse_specular: [zero; MAX_LOBES],
+            one_specular: [zero; MAX_LOBES],
+        };
+        Arrow { channel: [sums; C], specular_specular: [[zero; MAX_LOBES]; MAX_LOBES], right: Magnitudes::zero() }
+    }
+
+    /// Adds one light: its basis values, and per channel radiance and weight. `colour` is the light's.
+    #[inline(always)]
+    pub fn add<const AMBIENT: bool>(
+        &mut self,
+        lobes: usize,
+        diffuse: Lane<FMA>,
+        specular: &[Lane<FMA>; MAX_LOBES],
+        radiance: &[Lane<FMA>; C],
+        weight: &[Lane<FMA>; C],
+        colour: &[Lane<FMA>; C],
+    ) {
+        // Σ_k s_k² w and Σ_k s_k w y, so that the lobes' own sums are taken once and not once per channel.
+        let mut lobe_weight = Lane::splat(0.0);
+        let mut lobe_radiance = Lane::splat(0.0);
+        for k in 0..C {
+            let sums = &mut self.channel[k];
+            let weighted = weight[k] * diffuse;
+            let coloured = weight[k] * colour[k];
+            sums.diffuse_diffuse = weighted.mul_add(diffuse, sums.diffuse_diffuse);
+            self.right.diffuse[k] = weighted.mul_add(radiance[k], self.right.diffuse[k]);
+            if AMBIENT {
+                sums.diffuse_one = sums.diffuse_one + weighted;
+                sums.one_one = sums.one_one + weight[k];
+                self.right.ambient[k] = weight[k].mul_add(radiance[k], self.right.ambient[k]);
+            }
+            if lobes > 0 {
+                lobe_weight = coloured.mul_add(colour[k], lobe_weight);
+                lobe_radiance = coloured.mul_add(radiance[k], lobe_radiance);
+                let coloured_diffuse = coloured * diffuse;
+                for j in 0..lobes {
+                    sums.diffuse_specular[j] = coloured_diffuse.mul_add(specular[j], sums.diffuse_specular[j]);
+                    if AMBIENT {
+                        sums.one_specular[j] = coloured.mul_add(specular[j], sums.one_specular[j]);
+                    }
+                }
+            }
+        }
+        for i in 0..lobes {
+            self.right.specular[i] = lobe_radiance.mul_add(specular[i], self.right.specular[i]);
+            let weighted = lobe_weight * specular[i];
+            for j in i..lobes {
+                self.specular_specular[i][j] = weighted.mul_add(specular[j], self.specular_specular[i][j]);
+            }
+        }
+    }
+
+    /// Eliminates the channels' blocks.
+    #[inline(always)]
+    pub fn factor<const AMBIENT: bool>(&self, lobes: usize, free: &Free<C>) -> Factored<'_, FMA, C> {
+        let zero = Lane::splat(0.0);
+        let one = Lane::splat(1.0);
+        let mut inverse = [BlockInverse { diffuse: zero, cross: zero, ambient: zero }; C];
+        for k in 0..C {
+            let sums = &self.channel[k];
+            let lit = free.diffuse[k] & sums.diffuse_diffuse.gt(Lane::splat(1e-30));
+            let alone = Lane::select(lit, one / sums.diffuse_diffuse, zero);
+            inverse[k].diffuse = alone;
+            if AMBIENT {
+                // Where all lights meet the surface at one angle, Ad and Ae are one: Ae is then 0.
+                let product = sums.diffuse_diffuse * sums.one_one;
+                let determinant = product - sums.diffuse_one * sums.diffuse_one;
+                let both = lit & free.ambient[k] & determinant.gt(product * Lane::splat(1e-5));
+                let only_ambient = free.ambient[k] & !lit & sums.one_one.gt(Lane::splat(1e-30));
+                let scale = one / determinant;
+                inverse[k].diffuse = Lane::select(both, sums.one_one * scale, alone);
+                inverse[k].cross = Lane::select(both, -(sums.diffuse_one * scale), zero);
+                inverse[k].ambient = Lane::select(
+                    both,
+                    sums.diffuse_diffuse * scale,
+                    Lane::select(only_ambient, one / sums.one_one, zero),
+                );
+            }
+        }
+        let mut schur = self.specular_specular;
+        for i in 0..lobes {
+            for j in i..lobes {
+                for k in 0..C {
+                    let sums = &self.channel[k];
+                    let (diffuse, ambient) =
+                        inverse[k].apply::<AMBIENT>(sums.diffuse_specular[j], sums.one_specular[j]);
+                    schur[i][j] = schur[i][j] - sums.diffuse_specular[i] * diffuse;
+                    if AMBIENT {
+                        schur[i][j] = schur[i][j] - sums.one_specular[i] * ambient;
+                    }
+                }
+                if i == j {
+                    // A lobe that differs from the diffuse term by rounding only carries no information.
+                    let floor = self.specular_specular[i][i] * Lane::splat(1e-6);
+                    let kept = free.specular[i] & schur[i][i].gt(floor);
+                    schur[i][i] = Lane::select(kept, schur[i][i], zero);
+                }
+            }
+            for j in i + 1..lobes {
+                schur[i][j] = Lane::select(free.specular[i] & free.specular[j], schur[i][j], zero);
+            }
+        }
+        Factored { arrow: self, lobes, inverse, schur }
+    }
+
+    /// The magnitudes that fit best, none of them negative.
+    #[inline(always)]
+    pub fn magnitudes<const AMBIENT: bool>(&self, lobes: usize, free: &mut Free<C>) -> Magnitudes<FMA, C> {
+        let zero = Lane::splat(0.0);
+        let mut best;
+        // Holding every negative magnitude at 0 at once is not quite the constrained optimum where two of them are negative
+        // only together; the next step of the fit begins from here again and mends it.
+        loop {
+            best = self.factor::<AMBIENT>(lobes, free).solve::<AMBIENT>(&self.right);
+            let mut violated = LaneMask::NONE;
+            for j in 0..lobes {
+                let negative = best.specular[j].lt(zero) & free.specular[j];
+                free.specular[j] = free.specular[j] & !negative;
+                violated = violated | negative;
+            }
+            for k in 0..C {
+                let negative = best.diffuse[k].lt(zero) & free.diffuse[k];
+                free.diffuse[k] = free.diffuse[k] & !negative;
+                violated = violated | negative;
+                if AMBIENT {
+                    let negative = best.ambient[k].lt(zero) & free.ambient[k];
+                    free.ambient[k] = free.ambient[k] & !negative;
+                    violated = violated | negative;
+                }
+            }
+            // Each round holds one more magnitude at least, so this ends.
+            if !violated.any() {
+                break;
+            }
+        }
+        for k in 0..C {
+            best.diffuse[k] = best.diffuse[k].max(zero);
+            best.ambient[k] = best.ambient[k].max(zero);
+        }
+        for j in 0..lobes {
+            best.specular[j] = best.specular[j].max(zero);
+        }
+        best
+    }
+}
+
+/// The inverse of a channel's block of (diffuse, ambient).
+#[derive(Clone, Copy)]
+struct BlockInverse<const FMA: bool> {
+    diffuse: Lane<FMA>,
+    cross: Lane<FMA>,
+    ambient: Lane<FMA>,
+}
+
+impl<const FMA: bool> BlockInverse<FMA> {
+    #[inline(always)]
+    fn apply<const AMBIENT: bool>(&self, diffuse: Lane<FMA>, ambient: Lane<FMA>) -> (Lane<FMA>, Lane<FMA>) {
+        if AMBIENT {
+            (self.diffuse.mul_add(diffuse, self.cross * ambient), self.cross.mul_add(diffuse, self.ambient * ambient))
+        } else {
+            (self.diffuse * diffuse, Lane::splat(0.0))
+        }
+    }
+}
+
+/// The normal equations, ready to be solved for any right-hand side.
+pub struct Factored<'a, const FMA: bool, const C: usize> {
+    arrow: &'a Arrow<FMA, C>,
+    lobes: usize,
+    inverse: [BlockInverse<FMA>; C],
+    schur: [[Lane<FMA>; MAX_LOBES]; MAX_LOBES],
+}
+
+impl<const FMA: bool, const C: usize> Factored<'_, FMA, C> {
+    #[inline(always)]
+    pub fn solve<const AMBIENT: bool>(&self, right: &Magnitudes<FMA, C>) -> Magnitudes<FMA, C> {
+        let mut result = *right;
+        for k in 0..C {
+            (result.diffuse[k], result.ambient[k]) =
+                self.inverse[k].apply::<AMBIENT>(right.diffuse[k], right.ambient[k]);
+        }
+        if self.lobes == 0 {
+            return result;
+        }
+        for j in 0..self.lobes {
+            for k in 0..C {
+                let sums = &self.arrow.channel[k];
+                result.specular[j] = result.specular[j] - sums.diffuse_specular[j] * result.diffuse[k];
+                if AMBIENT {
+                    result.specular[j] = result.specular[j] - sums.one_specular[j] * result.ambient[k];
+                }
+            }
+        }
+        result.specular = solve_symmetric(self.schur, result.specular);
+        for k in 0..C {
+            let sums = &self.arrow.channel[k];
+            let mut diffuse = right.diffuse[k];
+            let mut ambient = right.ambient[k];
+            for j in 0..self.lobes {
+                diffuse = diffuse - sums.diffuse_specular[j] * result.specular[j];
+                if AMBIENT {
+                    ambient = ambient - sums.one_specular[j] * result.specular[j];
+                }
+            }
+            (result.diffuse[k], result.ambient[k]) = self.inverse[k].apply::<AMBIENT>(diffuse, ambient);
+        }
+        result
+    }
+}

@@ -1,0 +1,152 @@
+//! Forward-mode automatic differentiation: a value and its derivatives with respect to P parameters.
+
+use crate::number::{Number, Real};
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+#[derive(Clone, Copy, Debug)]
+pub struct Dual<R, const P: usize> {
+    pub value: R,
+    pub derivative: [R; P],
+}
+
+impl<R: Real, const P: usize> Dual<R, P> {
+    /// The parameter number `index` itself, scaled so that its derivative is `slope`.
+    #[inline(always)]
+    pub fn parameter(value: R, index: usize, slope: R) -> Self {
+        let mut dual = Self::constant(value);
+        dual.derivative[index] = slope;
+        dual
+    }
+
+    /// f(self), given f's value and its slope there.
+    #[inline(always)]
+    fn chain(self, value: R, slope: R) -> Self {
+        let mut derivative = self.derivative;
+        for d in derivative.iter_mut() {
+            *d = *d * slope;
+        }
+        Dual { value, derivative }
+    }
+}
+
+impl<R: Real, const P: usize> Neg for Dual<R, P> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        let mut derivative = self.derivative;
+        for d in derivative.iter_mut() {
+            *d = -*d;
+        }
+        Dual { value: -self.value, derivative }
+    }
+}
+
+impl<R: Real, const P: usize> Add for Dual<R, P> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        let mut derivative = self.derivative;
+        for i in 0..P {
+            derivative[i] = derivative[i] + other.derivative[i];
+        }
+        Dual { value: self.value + other.value, derivative }
+    }
+}
+
+impl<R: Real, const P: usize> Sub for Dual<R, P> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        let mut derivative = self.derivative;
+        for i in 0..P {
+            derivative[i] = derivative[i] - other.derivative[i];
+        }
+        Dual { value: self.value - other.value, derivative }
+    }
+}
+
+impl<R: Real, const P: usize> Mul for Dual<R, P> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        let mut derivative = self.derivative;
+        for i in 0..P {
+            derivative[i] = derivative[i].mul_add(other.value, self.value * other.derivative[i]);
+        }
+        Dual { value: self.value * other.value, derivative }
+    }
+}
+
+impl<R: Real, const P: usize> Div for Dual<R, P> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        let inverse = R::splat(1.0) / other.value;
+        let value = self.value * inverse;
+        let mut derivative = self.derivative;
+        for i in 0..P {
+            derivative[i] = (derivative[i] - value * other.derivative[i]) * inverse;
+        }
+        Dual { value, derivative }
+    }
+}
+
+impl<R: Real, const P: usize> Number for Dual<R, P> {
+    type Real = R;
+
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        Self::constant(R::splat(value))
+    }
+    #[inline(always)]
+    fn constant(value: R) -> Self {
+        Dual { value, derivative: [R::splat(0.0); P] }
+    }
+    #[inline(always)]
+    fn value(self) -> R {
+        self.value
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        let root = self.value.sqrt();
+        self.chain(root, R::splat(0.5) / root)
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        let value = self.value.exp();
+        self.chain(value, value)
+    }
+    #[inline(always)]
+    fn ln_1p(self) -> Self {
+        self.chain(self.value.ln_1p(), R::splat(1.0) / (R::splat(1.0) + self.value))
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        let mut derivative = addend.derivative;
+        for i in 0..P {
+            derivative[i] = self.derivative[i].mul_add(factor.value, derivative[i]);
+            derivative[i] = self.value.mul_add(factor.derivative[i], derivative[i]);
+        }
+        Dual { value: self.value.mul_add(factor.value, addend.value), derivative }
+    }
+    #[inline(always)]
+    fn scale_add(self, factor: R, addend: Self) -> Self {
+        let mut derivative = addend.derivative;
+        for i in 0..P {
+            derivative[i] = self.derivative[i].mul_add(factor, derivative[i]);
+        }
+        Dual { value: self.value.mul_add(factor, addend.value), derivative }
+    }
+    #[inline(always)]
+    fn scale(self, factor: R) -> Self {
+        self.chain(self.value * factor, factor)
+    }
+    #[inline(always)]
+    fn select(mask: R::Mask, yes: Self, no: Self) -> Self {
+        let mut derivative = no.derivative;
+        for i in 0..P {
+            derivative[i] = R::select(mask, yes.derivative[i], derivative[i]);
+        }
+        Dual { value: R::select(mask, yes.value, no.value), derivative }
+    }
+}

@@ -1,0 +1,257 @@
+//! The joint fit: normal, shape and magnitudes of a pixel over all its lights at once.
+
+use crate::dual::Dual;
+use crate::geometry::Illumination;
+use crate::lanes::Lane;
+use crate::minimise::{inverse, minimise};
+use crate::models::{Basis, MAX_LOBES, MAX_SHAPE, Model, Optics};
+use crate::number::{Number, Real, array};
+use crate::observations::{Group, Observation, Stack};
+use crate::record::{Layout, Row, Status};
+use crate::separable::{Loss, Point, Separable, Solution};
+use crate::start::{Grey, grey, start};
+use std::marker::PhantomData;
+
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    pub optics: Optics,
+    pub loss: Loss,
+    pub max_steps: usize,
+}
+
+/// The fit of groups of eight pixels, with its buffers.
+pub struct JointFit<'a, M, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool> {
+    stack: &'a Stack<'a>,
+    options: Options,
+    colour: [Lane<FMA>; C],
+    group: Group<FMA, C>,
+    grey: Vec<Grey<FMA>>,
+    scratch: Scratch<FMA, C, P>,
+    model: PhantomData<M>,
+}
+
+/// Buffers with one entry per light, handed from group to group.
+pub struct Scratch<const FMA: bool, const C: usize, const P: usize> {
+    robust: Vec<[Lane<FMA>; C]>,
+    basis: Vec<Basis<Dual<Lane<FMA>, P>>>,
+}
+
+impl<const FMA: bool, const C: usize, const P: usize> Scratch<FMA, C, P> {
+    pub fn new(lights: usize) -> Self {
+        let zero = Dual::constant(Lane::splat(0.0));
+        Scratch {
+            robust: vec![[Lane::splat(1.0); C]; lights],
+            basis: vec![Basis { diffuse: zero, specular: [zero; MAX_LOBES] }; lights],
+        }
+    }
+}
+
+impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool>
+    JointFit<'a, M, FMA, C, P, AMBIENT>
+{
+    pub const LAYOUT: Layout =
+        Layout { channels: C, lobes: M::LOBES, shape: P - 2, ambient: if AMBIENT { C } else { 0 } };
+
+    /// Unknowns that each channel's samples must determine.
+    const UNKNOWNS: usize = P + 1 + M::LOBES + AMBIENT as usize;
+
+    pub fn new(stack: &'a Stack<'a>, colour: &[f64], options: Options) -> Self {
+        const { assert!(P == 2 + M::SHAPE.len()) };
+        JointFit {
+            stack,
+            options,
+            colour: array!(|k| Lane::splat(colour[k])),
+            group: Group::new(stack),
+            grey: Vec::with_capacity(stack.lights.len()),
+            scratch: Scratch::new(stack.lights.len()),
+            model: PhantomData,
+        }
+    }
+
+    /// Fits the eight pixels from `first` on and writes those that the tile has.
+    #[inline(always)]
+    pub fn fit_group(&mut self, first: usize, rows: &mut [f32], status: &mut [u8]) {
+        self.group.gather(self.stack, first);
+        grey(&self.group.observations, &mut self.grey);
+        let wanted = !self.group.usable_lights.lt(Lane::splat(Self::UNKNOWNS as f64));
+        let begin = start::<M, FMA, AMBIENT>(&self.grey, &self.group.illuminations, &self.options.optics);
+
+        let mut problem = separable::<M, FMA, C, P, AMBIENT>(
+            &self.group.observations,
+            &self.group.illuminations,
+            self.colour,
+            &self.options,
+            &mut self.scratch,
+        );
+        let outcome = minimise(&mut problem, &begin, wanted, self.options.max_steps);
+        let solution = problem.solve(&outcome.point);
+        let summary = summarise(&problem, &solution);
+        let at_bound = problem.at_bound(&outcome.point, &solution.magnitudes);
+        let deviations = Deviations::new::<P, AMBIENT>(M::LOBES, &solution, summary.chi2_reduced);
+        (self.scratch.robust, self.scratch.basis) = (problem.robust, problem.basis);
+
+        let width = Self::LAYOUT.width();
+        for (lane, status) in status.iter_mut().enumerate() {
+            *status = if !wanted.holds(lane) {
+                if self.group.clipped.0[lane] > 0.0 && self.group.usable_lights.0[lane] == 0.0 {
+                    Status::AllClipped
+                } else {
+                    Status::TooFewLights
+                }
+            } else if !outcome.converged.holds(lane) {
+                Status::StepLimit
+            } else if at_bound.holds(lane) {
+                Status::AtBound
+            } else {
+                Status::Converged
+            } as u8;
+            let row = &mut rows[lane * width..(lane + 1) * width];
+            if !wanted.holds(lane) {
+                row.fill(f32::NAN);
+                continue;
+            }
+            write_row::<FMA, C, P>(Row::new(row), Self::LAYOUT, lane, &outcome.point, &solution, &summary, &deviations);
+        }
+    }
+}
+
+/// The problem of one group over borrowed buffers, which the caller takes back from it.
+#[inline(always)]
+pub fn separable<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool>(
+    observations: &'a [Observation<FMA, C>],
+    illuminations: &'a [Illumination<Lane<FMA>>],
+    colour: [Lane<FMA>; C],
+    options: &Options,
+    scratch: &mut Scratch<FMA, C, P>,
+) -> Separable<'a, M, FMA, C, P, AMBIENT> {
+    let mut robust = std::mem::take(&mut scratch.robust);
+    if options.loss != Loss::Linear {
+        robust.fill([Lane::splat(1.0); C]);
+    }
+    Separable {
+        observations,
+        illuminations,
+        colour,
+        optics: options.optics,
+        loss: options.loss,
+        fixed_specular: None,
+        robust,
+        basis: std::mem::take(&mut scratch.basis),
+        model: PhantomData,
+    }
+}
+
+struct Summary<const FMA: bool> {
+    chi2_reduced: Lane<FMA>,
+    /// Root mean square over the usable samples, in relative radiance as measured.
+    residual_rms: Lane<FMA>,
+}
+
+#[inline(always)]
+fn summarise<M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool>(
+    problem: &Separable<'_, M, FMA, C, P, AMBIENT>,
+    solution: &Solution<FMA, C, P>,
+) -> Summary<FMA> {
+    let (zero, one) = (Lane::splat(0.0), Lane::splat(1.0));
+    let mut samples = zero;
+    let mut chi2 = zero;
+    let mut squares = zero;
+    for (light, observation) in problem.observations.iter().enumerate() {
+        let predicted = problem.predicted(&solution.magnitudes, light);
+        for k in 0..C {
+            let residual = observation.radiance[k] - predicted[k];
+            let measured = residual * observation.irradiance[k];
+            let usable = observation.weight[k].positive();
+            samples = samples + Lane::select(usable, one, zero);
+            squares = squares + Lane::select(usable, measured * measured, zero);
+            chi2 = chi2 + observation.weight[k] * residual * residual;
+        }
+    }
+    let unknowns = P + M::LOBES + C * (1 + AMBIENT as usize);
+    let freedom = (samples - Lane::splat(unknowns as f64)).max(one);
+    Summary { chi2_reduced: chi2 / freedom, residual_rms: (squares / samples.max(one)).sqrt() }
+}
+
+/// Standard deviations from the Fisher information at the solution. Where the residuals exceed the noise model they are
+/// raised by √χ²_reduced (Birge 1932), for what the model does not describe is then the larger error.
+struct Deviations<const FMA: bool, const C: usize> {
+    /// Root mean square angle between the fitted and the true normal, radians.
+    normal: Lane<FMA>,
+    /// Relative, for the parameters are fitted in their logarithm.
+    shape_relative: [Lane<FMA>; MAX_SHAPE],
+    diffuse: [Lane<FMA>; C],
+    ambient: [Lane<FMA>; C],
+    specular: [Lane<FMA>; MAX_LOBES],
+}
+
+#[inline(always)]
+fn deviation<const FMA: bool>(variance: Lane<FMA>, birge: Lane<FMA>) -> Lane<FMA> {
+    (variance * birge).max(Lane::splat(0.0)).sqrt()
+}
+
+impl<const FMA: bool, const C: usize> Deviations<FMA, C> {
+    #[inline(always)]
+    fn new<const P: usize, const AMBIENT: bool>(
+        lobes: usize,
+        solution: &Solution<FMA, C, P>,
+        chi2_reduced: Lane<FMA>,
+    ) -> Self {
+        let zero = Lane::splat(0.0);
+        let birge = chi2_reduced.max(Lane::splat(1.0));
+        let mut hessian = solution.quadratic.hessian;
+        for p in 0..P {
+            for q in 0..p {
+                hessian[p][q] = hessian[q][p];
+            }
+        }
+        let covariance = inverse(&hessian);
+        let mut result = Deviations {
+            normal: deviation(covariance[0][0] + covariance[1][1], birge),
+            shape_relative: [zero; MAX_SHAPE],
+            diffuse: [zero; C],
+            ambient: [zero; C],
+            specular: [zero; MAX_LOBES],
+        };
+        for i in 0..P - 2 {
+            // A parameter that nothing depends on has an entry of 0 and is known not at all.
+            let variance = covariance[2 + i][2 + i];
+            result.shape_relative[i] =
+                Lane::select(variance.positive(), deviation(variance, birge), Lane::splat(f64::from(f32::INFINITY)));
+        }
+        let variances = solution.magnitude_variances::<AMBIENT>(lobes, &covariance);
+        for k in 0..C {
+            result.diffuse[k] = deviation(variances.diffuse[k], birge);
+            result.ambient[k] = deviation(variances.ambient[k], birge);
+        }
+        for j in 0..MAX_LOBES {
+            result.specular[j] = deviation(variances.specular[j], birge);
+        }
+        result
+    }
+}
+
+#[inline(always)]
+fn write_row<const FMA: bool, const C: usize, const P: usize>(
+    mut row: Row,
+    layout: Layout,
+    lane: usize,
+    point: &Point<FMA>,
+    solution: &Solution<FMA, C, P>,
+    summary: &Summary<FMA>,
+    deviations: &Deviations<FMA, C>,
+) {
+    let magnitudes = &solution.magnitudes;
+    let shape: [f32; MAX_SHAPE] = array!(|i| point.shape_log[i].0[lane].exp());
+    row.extend(point.normal.iter().map(|x| x.0[lane]));
+    row.extend(magnitudes.diffuse.iter().map(|x| x.0[lane]));
+    row.extend(magnitudes.specular[..layout.lobes].iter().map(|x| x.0[lane]));
+    row.extend(shape[..layout.shape].iter().copied());
+    row.extend(magnitudes.ambient[..layout.ambient].iter().map(|x| x.0[lane]));
+    row.push(summary.chi2_reduced.0[lane]);
+    row.push(summary.residual_rms.0[lane]);
+    row.push(deviations.normal.0[lane]);
+    row.extend(deviations.diffuse.iter().map(|x| x.0[lane]));
+    row.extend(deviations.specular[..layout.lobes].iter().map(|x| x.0[lane]));
+    row.extend((0..layout.shape).map(|i| shape[i] * deviations.shape_relative[i].0[lane]));
+    row.extend(deviations.ambient[..layout.ambient].iter().map(|x| x.0[lane]));
+}

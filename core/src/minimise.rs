@@ -1,0 +1,231 @@
+//! Bounded Levenberg-Marquardt, eight independent problems side by side.
+//!
+//! Levenberg 1944, Marquardt 1963; damping scaled by the Hessian's diagonal. Each lane has its own damping and stops on its
+//! own; finished lanes keep their point while the others go on (repacking them gained nothing).
+
+use crate::lanes::{Lane, LaneMask};
+use crate::number::{Mask, Number, Real};
+
+/// A cost, half its descent direction and the Gauss-Newton approximation of half its Hessian at a point.
+#[derive(Clone, Copy)]
+pub struct Quadratic<const FMA: bool, const P: usize> {
+    pub cost: Lane<FMA>,
+    /// JᵀW r with r = data − model: minus half the cost's gradient.
+    pub descent: [Lane<FMA>; P],
+    /// JᵀW J; the upper triangle is used.
+    pub hessian: [[Lane<FMA>; P]; P],
+}
+
+impl<const FMA: bool, const P: usize> Quadratic<FMA, P> {
+    #[inline(always)]
+    pub fn zero() -> Self {
+        let zero = Lane::splat(0.0);
+        Quadratic { cost: zero, descent: [zero; P], hessian: [[zero; P]; P] }
+    }
+
+    #[inline(always)]
+    fn select(mask: LaneMask, yes: &Self, no: &Self) -> Self {
+        let mut result = *no;
+        result.cost = Lane::select(mask, yes.cost, no.cost);
+        for i in 0..P {
+            result.descent[i] = Lane::select(mask, yes.descent[i], no.descent[i]);
+            for j in i..P {
+                result.hessian[i][j] = Lane::select(mask, yes.hessian[i][j], no.hessian[i][j]);
+            }
+        }
+        result
+    }
+}
+
+/// A least-squares problem in P parameters that live on some manifold of points.
+pub trait Objective<const FMA: bool, const P: usize> {
+    type Point: Copy;
+
+    fn quadratic(&mut self, point: &Self::Point) -> Quadratic<FMA, P>;
+    /// The point reached by a step, moved back inside the bounds.
+    fn moved(&self, point: &Self::Point, step: &[Lane<FMA>; P]) -> Self::Point;
+    /// Parameters that lie at a bound which `descent` pushes against.
+    fn blocked(&self, point: &Self::Point, descent: &[Lane<FMA>; P]) -> [LaneMask; P];
+    fn select(mask: LaneMask, yes: &Self::Point, no: &Self::Point) -> Self::Point;
+    /// Called with each point the minimiser has settled on so far; the lanes of `mask` have just moved there.
+    fn accepted(&mut self, _point: &Self::Point, _mask: LaneMask) {}
+}
+
+pub struct Outcome<Point> {
+    pub point: Point,
+    /// Lanes whose cost had stopped changing before the steps ran out.
+    pub converged: LaneMask,
+}
+
+/// Relative change of the cost below which a lane has converged, whichever its sign: in f32 the last step is often rejected
+/// by rounding alone.
+const TOLERANCE: f64 = 1e-5;
+
+#[inline(always)]
+pub fn minimise<const FMA: bool, const P: usize, O: Objective<FMA, P>>(
+    objective: &mut O,
+    start: &O::Point,
+    wanted: LaneMask,
+    max_steps: usize,
+) -> Outcome<O::Point> {
+    let mut point = *start;
+    let mut trial_point = *start;
+    let mut current = Quadratic::zero();
+    current.cost = Lane::splat(f64::from(f32::MAX));
+    let mut damping = Lane::splat(1e-2);
+    let mut active = wanted;
+    // The start itself is the first trial, which every lane accepts.
+    for _ in 0..=max_steps {
+        let trial = objective.quadratic(&trial_point);
+        let better = trial.cost.lt(current.cost) & active;
+        let settled = (trial.cost - current.cost).abs().lt(current.cost * Lane::splat(TOLERANCE));
+        damping = damping * Lane::select(better, Lane::splat(0.1), Lane::splat(8.0));
+        damping = damping.max(Lane::splat(1e-7));
+
+        point = O::select(better, &trial_point, &point);
+        current = Quadratic::select(better, &trial, &current);
+        objective.accepted(&point, better);
+        // Damping beyond this bound means that no step, however short, lowers the cost: a kink or a flat valley.
+        let stuck = damping.gt(Lane::splat(1e7));
+        active = active & !(settled | stuck);
+        if !active.any() {
+            break;
+        }
+        let blocked = objective.blocked(&point, &current.descent);
+        trial_point = objective.moved(&point, &damped_step(&current, damping, &blocked));
+    }
+    Outcome { point, converged: wanted & !active }
+}
+
+/// Solves (H + damping · diag H) step = descent by LDLᵀ, with blocked parameters held.
+#[inline(always)]
+fn damped_step<const FMA: bool, const P: usize>(
+    at: &Quadratic<FMA, P>,
+    damping: Lane<FMA>,
+    blocked: &[LaneMask; P],
+) -> [Lane<FMA>; P] {
+    let zero = Lane::splat(0.0);
+    let mut matrix = at.hessian;
+    let mut right = at.descent;
+    for i in 0..P {
+        matrix[i][i] = matrix[i][i] * (Lane::splat(1.0) + damping);
+        right[i] = Lane::select(blocked[i], zero, right[i]);
+        for j in i + 1..P {
+            matrix[i][j] = Lane::select(blocked[i] | blocked[j], zero, matrix[i][j]);
+        }
+    }
+    solve_symmetric(matrix, right)
+}
+
+/// Solves a symmetric positive semidefinite system given by its upper triangle. A parameter that nothing depends on gets 0.
+#[inline(always)]
+pub fn solve_symmetric<const FMA: bool, const P: usize>(
+    mut matrix: [[Lane<FMA>; P]; P],
+    mut right: [Lane<FMA>; P],
+) -> [Lane<FMA>; P] {
+    let mut inverse = [Lane::splat(0.0); P];
+    for i in 0..P {
+        let pivot = matrix[i][i];
+        let singular = pivot.lt(Lane::splat(1e-30));
+        inverse[i] = Lane::select(singular, Lane::splat(0.0), Lane::splat(1.0) / pivot);
+        for j in i + 1..P {
+            let factor = matrix[i][j] * inverse[i];
+            for k in j..P {
+                matrix[j][k] = matrix[j][k] - factor * matrix[i][k];
+            }
+            right[j] = right[j] - factor * right[i];
+        }
+    }
+    for i in (0..P).rev() {
+        let mut sum = right[i];
+        for j in i + 1..P {
+            sum = sum - matrix[i][j] * right[j];
+        }
+        right[i] = sum * inverse[i];
+    }
+    right
+}
+
+/// The inverse of a symmetric positive definite matrix given by its upper triangle; rows and columns of parameters that
+/// nothing depends on are 0.
+#[inline(always)]
+pub fn inverse<const FMA: bool, const P: usize>(matrix: &[[Lane<FMA>; P]; P]) -> [[Lane<FMA>; P]; P] {
+    let mut columns = [[Lane::splat(0.0); P]; P];
+    for i in 0..P {
+        let mut unit = [Lane::splat(0.0); P];
+        unit[i] = Lane::splat(1.0);
+        columns[i] = solve_symmetric(*matrix, unit);
+    }
+    columns
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::LANES;
+
+    struct Rosenbrock {
+        lower: f32,
+    }
+
+    /// r = (10 (y − x²), 1 − x), written as data − model; x bounded below.
+    impl Objective<false, 2> for Rosenbrock {
+        type Point = [Lane<false>; 2];
+
+        fn quadratic(&mut self, point: &Self::Point) -> Quadratic<false, 2> {
+            let [x, y] = *point;
+            let ten = Lane::splat(10.0);
+            let first = ten * (y - x * x);
+            let second = Lane::splat(1.0) - x;
+            let jacobian = [[ten * (x + x), -ten], [Lane::splat(1.0), Lane::splat(0.0)]];
+            let residual = [first, second];
+            let mut result = Quadratic::zero();
+            result.cost = first * first + second * second;
+            for (row, r) in jacobian.iter().zip(residual) {
+                for i in 0..2 {
+                    result.descent[i] = result.descent[i] + row[i] * r;
+                    for j in i..2 {
+                        result.hessian[i][j] = result.hessian[i][j] + row[i] * row[j];
+                    }
+                }
+            }
+            result
+        }
+        fn moved(&self, point: &Self::Point, step: &[Lane<false>; 2]) -> Self::Point {
+            [(point[0] + step[0]).max(Lane([self.lower; LANES])), point[1] + step[1]]
+        }
+        fn blocked(&self, point: &Self::Point, descent: &[Lane<false>; 2]) -> [LaneMask; 2] {
+            [LaneMask::new(|i| point[0].0[i] <= self.lower && descent[0].0[i] < 0.0), LaneMask::NONE]
+        }
+        fn select(mask: LaneMask, yes: &Self::Point, no: &Self::Point) -> Self::Point {
+            [Lane::select(mask, yes[0], no[0]), Lane::select(mask, yes[1], no[1])]
+        }
+    }
+
+    #[test]
+    fn finds_the_minimum_of_rosenbrocks_valley_from_eight_starts() {
+        let start =
+            [Lane([-1.2, 0.0, 2.0, -2.0, 0.5, 1.5, -0.5, 3.0]), Lane([1.0, 0.0, -1.0, 2.0, 0.5, 0.0, 1.0, 1.0])];
+        let all = LaneMask::ALL;
+        let outcome = minimise(&mut Rosenbrock { lower: -10.0 }, &start, all, 200);
+        for i in 0..LANES {
+            assert!(outcome.converged.holds(i));
+            assert!((outcome.point[0].0[i] - 1.0).abs() < 1e-3 && (outcome.point[1].0[i] - 1.0).abs() < 2e-3);
+        }
+    }
+
+    #[test]
+    fn holds_a_parameter_at_its_bound() {
+        let start = [Lane::splat(3.0), Lane::splat(1.0)];
+        let outcome = minimise(&mut Rosenbrock { lower: 1.5 }, &start, LaneMask::ALL, 200);
+        assert_eq!(outcome.point[0].0[0], 1.5);
+        assert!((outcome.point[1].0[0] - 2.25).abs() < 1e-3);
+    }
+
+    #[test]
+    fn says_so_when_the_steps_run_out() {
+        let start = [Lane::splat(-1.2), Lane::splat(1.0)];
+        let outcome = minimise(&mut Rosenbrock { lower: -10.0 }, &start, LaneMask::ALL, 2);
+        assert!(!outcome.converged.any());
+    }
+}

@@ -1,0 +1,174 @@
+//! The factors of a microfacet lobe: D, the distribution of facet slopes; F, Fresnel's reflectance; G, shadowing and masking.
+
+use super::ShapeParameter;
+use crate::geometry::Illumination;
+use crate::number::Number;
+
+/// D, with D = 1 where the facet's normal is the surface's.
+pub trait Distribution {
+    const SHAPE: ShapeParameter;
+    const TITLE: &'static str;
+    const CITATION: &'static str;
+    const STARTS: &'static [[f64; super::MAX_SHAPE]];
+    /// `chord_squared` is |n − h|² = 2 (1 − n·h).
+    fn evaluate<N: Number>(shape: N, chord_squared: N) -> N;
+}
+
+/// Trowbridge & Reitz 1975 (paper, Eq. 3): D = [c² / ((n·h)² (c² − 1) + 1)]².
+///
+/// c is the eccentricity of the ellipsoids, alpha in the form known as GGX: D = π α² D_GGX.
+pub struct TrowbridgeReitz;
+
+impl Distribution for TrowbridgeReitz {
+    const SHAPE: ShapeParameter = ShapeParameter {
+        name: "c",
+        lower: 0.004,
+        upper: 1.0,
+        meaning: "eccentricity of the facets' ellipsoids, small is glossy",
+    };
+    const TITLE: &'static str = "Trowbridge-Reitz facets";
+    const CITATION: &'static str = "TrowbridgeReitz1975";
+    // Up to 0.9: with a grid that ends at 0.5 a fifth of the fits of c in 0.5 … 0.9 fail.
+    const STARTS: &'static [[f64; super::MAX_SHAPE]] = &[
+        [0.03, 0.0, 0.0],
+        [0.06, 0.0, 0.0],
+        [0.12, 0.0, 0.0],
+        [0.22, 0.0, 0.0],
+        [0.38, 0.0, 0.0],
+        [0.6, 0.0, 0.0],
+        [0.9, 0.0, 0.0],
+    ];
+
+    #[inline(always)]
+    fn evaluate<N: Number>(c: N, chord_squared: N) -> N {
+        // The denominator is c² + (1 − c²) sin², with sin² = q (1 − q/4): the printed form loses 2.4e-3 of D in f32 at
+        // c = 0.01, this one 4e-6.
+        let sine_squared = chord_squared * chord_squared.scale_add(N::Real::splat(-0.25), N::splat(1.0));
+        let c_squared = c * c;
+        let denominator = sine_squared.mul_add(N::splat(1.0) - c_squared, c_squared);
+        (c_squared / denominator).squared()
+    }
+}
+
+/// Torrance & Sparrow 1967, Blinn 1977: D = exp(−(δ/m)²) with δ = acos(n·h) the facet's angle.
+pub struct Gaussian;
+
+impl Distribution for Gaussian {
+    const SHAPE: ShapeParameter = ShapeParameter {
+        name: "m",
+        lower: 0.004,
+        upper: 2.0,
+        meaning: "width of the distribution of facet angles in radians",
+    };
+    const TITLE: &'static str = "Gaussian facets";
+    const CITATION: &'static str = "TorranceSparrow1967";
+    const STARTS: &'static [[f64; super::MAX_SHAPE]] = &[
+        [0.03, 0.0, 0.0],
+        [0.06, 0.0, 0.0],
+        [0.12, 0.0, 0.0],
+        [0.22, 0.0, 0.0],
+        [0.38, 0.0, 0.0],
+        [0.65, 0.0, 0.0],
+        [1.1, 0.0, 0.0],
+    ];
+
+    #[inline(always)]
+    fn evaluate<N: Number>(m: N, chord_squared: N) -> N {
+        (-(facet_angle_squared(chord_squared) / (m * m))).exp()
+    }
+}
+
+/// δ² = 4 asin²(√x), x = q/4, from q = |n − h|², smooth at 0 where acos has no derivative.
+///
+/// The series asin²(√x) = ½ Σ (4x)^k / (k² C(2k, k)), economised by Chebyshev polynomials to degree 8 on x ≤ ½
+/// (δ ≤ 90°): 6e-9 relative.
+#[inline(always)]
+fn facet_angle_squared<N: Number>(chord_squared: N) -> N {
+    const SERIES: [f64; 9] = [
+        1.00000000563,
+        0.333331563364,
+        0.177868763769,
+        0.112501547467,
+        0.0985616054666,
+        -0.0306323304015,
+        0.327472653687,
+        -0.4184865884,
+        0.372402458434,
+    ];
+    let x = chord_squared.scale(N::Real::splat(0.25));
+    let mut sum = N::splat(SERIES[8]);
+    for i in (0..8).rev() {
+        sum = sum.mul_add(x, N::splat(SERIES[i]));
+    }
+    sum * chord_squared
+}
+
+/// Fresnel's reflectance of unpolarised light at a smooth dielectric, exactly (Cook & Torrance 1982, Eq. 15).
+#[inline(always)]
+pub fn fresnel<N: Number>(cosine: N, index: f64) -> N {
+    let one = N::splat(1.0);
+    let g = cosine.mul_add(cosine, N::splat(index * index - 1.0)).sqrt();
+    let (sum, difference) = (g + cosine, g - cosine);
+    let perpendicular = (difference / sum).squared();
+    let parallel = (cosine.mul_add(sum, -one) / cosine.mul_add(difference, one)).squared();
+    (perpendicular * (one + parallel)).scale(N::Real::splat(0.5))
+}
+
+/// G.
+pub trait Masking {
+    const TITLE: &'static str;
+    const CITATION: &'static str;
+    /// G / (n·v); only called where n·l and n·v are positive. `normal_half` is n·h, `shape` the distribution's.
+    fn over_normal_view<N: Number>(
+        shape: N,
+        normal_light: N,
+        normal_view: N,
+        normal_half: N,
+        at: &Illumination<N::Real>,
+    ) -> N;
+}
+
+/// Symmetric V-grooves (Torrance & Sparrow 1967; Blinn 1977): G = min(1, 2 (n·h)(n·v)/(v·h), 2 (n·h)(n·l)/(v·h)).
+pub struct VGroove;
+
+impl Masking for VGroove {
+    const TITLE: &'static str = "V-groove masking";
+    const CITATION: &'static str = "TorranceSparrow1967";
+
+    #[inline(always)]
+    fn over_normal_view<N: Number>(
+        _shape: N,
+        normal_light: N,
+        normal_view: N,
+        normal_half: N,
+        at: &Illumination<N::Real>,
+    ) -> N {
+        let twice = normal_half.scale(N::Real::splat(2.0) / at.light_half);
+        (twice * normal_light.min(normal_view)).min(N::splat(1.0)) / normal_view
+    }
+}
+
+/// Smith's masking for Trowbridge-Reitz facets, correlated by height (Heitz 2014, Eq. 99; Walter et al. 2007).
+///
+/// G = 2 (n·l)(n·v) / [(n·v) √(α² + (1 − α²)(n·l)²) + (n·l) √(α² + (1 − α²)(n·v)²)], α = c.
+pub struct Smith;
+
+impl Masking for Smith {
+    const TITLE: &'static str = "Smith masking";
+    const CITATION: &'static str = "Heitz2014";
+
+    #[inline(always)]
+    fn over_normal_view<N: Number>(
+        alpha: N,
+        normal_light: N,
+        normal_view: N,
+        _normal_half: N,
+        _at: &Illumination<N::Real>,
+    ) -> N {
+        let alpha_squared = alpha * alpha;
+        let rest = N::splat(1.0) - alpha_squared;
+        let light_root = (rest * normal_light).mul_add(normal_light, alpha_squared).sqrt();
+        let view_root = (rest * normal_view).mul_add(normal_view, alpha_squared).sqrt();
+        (normal_light + normal_light) / normal_view.mul_add(light_root, normal_light * view_root)
+    }
+}

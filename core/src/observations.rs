@@ -1,0 +1,164 @@
+//! What was measured at eight pixels: radiance and weight of every sample, gathered from the stack as it was decoded.
+
+use crate::geometry::{Illumination, Place};
+use crate::lanes::{LANES, Lane, LaneMask};
+use crate::number::{Number, Real, array};
+
+/// Samples as stored: (light, pixel, channel), linear.
+#[derive(Clone, Copy)]
+pub enum Samples<'a> {
+    U16(&'a [u16]),
+    F32(&'a [f32]),
+}
+
+/// Standard deviation of a sample: variance = read² + photon · Y + (relative · Y)², in relative radiance.
+#[derive(Clone, Copy, Debug)]
+pub struct Noise {
+    pub read: f32,
+    pub photon: f32,
+    pub relative: f32,
+}
+
+/// Photographs of a tile of pixels, and where lights and camera stood.
+pub struct Stack<'a> {
+    pub samples: Samples<'a>,
+    pub pixels: usize,
+    /// radiance = scale · sample + offset.
+    pub scale: f32,
+    pub offset: f32,
+    pub lights: Vec<Place>,
+    /// (light, channel): irradiance at the centre of the painting.
+    pub intensity: Vec<f32>,
+    pub camera: Place,
+    /// (pixel, 2): X and Y in mm; read only where a light or the camera is near.
+    pub position_mm: Option<&'a [f32]>,
+    /// Per channel: samples from here on are clipped.
+    pub clip_level: Vec<f32>,
+    /// Samples below this are in shadow and left out.
+    pub shadow_level: f32,
+    /// (light, pixel): nonzero leaves a sample out.
+    pub sample_mask: Option<&'a [u8]>,
+    pub noise: Noise,
+}
+
+impl Stack<'_> {
+    pub fn near(&self) -> bool {
+        self.camera.near() || self.lights.iter().any(Place::near)
+    }
+
+    /// The samples of one light at eight pixels, per channel, as stored.
+    #[inline(always)]
+    fn stored<const FMA: bool, const C: usize>(&self, light: usize, pixel: &[usize; LANES]) -> [Lane<FMA>; C] {
+        let mut result = [Lane([0.0; LANES]); C];
+        for i in 0..LANES {
+            let first = (light * self.pixels + pixel[i]) * C;
+            match self.samples {
+                Samples::U16(values) => {
+                    let values = &values[first..first + C];
+                    for k in 0..C {
+                        result[k].0[i] = f32::from(values[k]);
+                    }
+                }
+                Samples::F32(values) => {
+                    let values = &values[first..first + C];
+                    for k in 0..C {
+                        result[k].0[i] = values[k];
+                    }
+                }
+            }
+        }
+        result
+    }
+}
+
+/// One light's samples at eight pixels. Radiance is per unit of irradiance, so that models need not know of intensities.
+#[derive(Clone, Copy)]
+pub struct Observation<const FMA: bool, const C: usize> {
+    pub radiance: [Lane<FMA>; C],
+    /// Inverse variance; 0 for a sample that is clipped, in shadow or missing.
+    pub weight: [Lane<FMA>; C],
+    /// The irradiance that the radiance was divided by.
+    pub irradiance: [Lane<FMA>; C],
+}
+
+/// Everything known of a group of eight pixels. The buffers are reused from group to group.
+pub struct Group<const FMA: bool, const C: usize> {
+    pub observations: Vec<Observation<FMA, C>>,
+    pub illuminations: Vec<Illumination<Lane<FMA>>>,
+    /// Lights with at least one usable sample, per pixel.
+    pub usable_lights: Lane<FMA>,
+    /// Clipped samples, per pixel.
+    pub clipped: Lane<FMA>,
+}
+
+impl<const FMA: bool, const C: usize> Group<FMA, C> {
+    pub fn new(stack: &Stack) -> Self {
+        let zero = [Lane::splat(0.0); C];
+        let observation = Observation { radiance: zero, weight: zero, irradiance: zero };
+        let mut group = Group {
+            observations: vec![observation; stack.lights.len()],
+            illuminations: Vec::with_capacity(stack.lights.len()),
+            usable_lights: Lane::splat(0.0),
+            clipped: Lane::splat(0.0),
+        };
+        group.illuminate(stack, Lane::splat(0.0), Lane::splat(0.0));
+        group
+    }
+
+    /// Directions for pixels at these positions, and the irradiances.
+    #[inline(always)]
+    fn illuminate(&mut self, stack: &Stack, x_mm: Lane<FMA>, y_mm: Lane<FMA>) {
+        let (view, _) = stack.camera.seen_from(x_mm, y_mm);
+        self.illuminations.clear();
+        for (light, place) in stack.lights.iter().enumerate() {
+            let (direction, falloff) = place.seen_from(x_mm, y_mm);
+            self.illuminations.push(Illumination::new(direction, view));
+            for channel in 0..C {
+                let intensity = Lane([stack.intensity[light * C + channel]; LANES]);
+                self.observations[light].irradiance[channel] = intensity * falloff;
+            }
+        }
+    }
+
+    /// Reads the eight pixels from `start` on; past the end of the tile the last pixel is repeated.
+    #[inline(always)]
+    pub fn gather(&mut self, stack: &Stack, start: usize) {
+        let pixel: [usize; LANES] = array!(|i| (start + i).min(stack.pixels - 1));
+        if let (true, Some(position)) = (stack.near(), stack.position_mm) {
+            let x_mm = Lane(array!(|i| position[2 * pixel[i]]));
+            let y_mm = Lane(array!(|i| position[2 * pixel[i] + 1]));
+            self.illuminate(stack, x_mm, y_mm);
+        }
+        let (zero, one) = (Lane::splat(0.0), Lane::splat(1.0));
+        let (scale, offset) = (Lane([stack.scale; LANES]), Lane([stack.offset; LANES]));
+        let read_variance = Lane::splat(f64::from(stack.noise.read).powi(2));
+        let photon = Lane([stack.noise.photon; LANES]);
+        let relative_variance = Lane::splat(f64::from(stack.noise.relative).powi(2));
+        let shadow_level = Lane([stack.shadow_level; LANES]);
+        self.usable_lights = zero;
+        self.clipped = zero;
+        for (light, observation) in self.observations.iter_mut().enumerate() {
+            let stored = stack.stored::<FMA, C>(light, &pixel);
+            let mut left_out = LaneMask::NONE;
+            if let Some(mask) = stack.sample_mask {
+                left_out = LaneMask(array!(|i| u32::from(mask[light * stack.pixels + pixel[i]] == 0).wrapping_sub(1)));
+            }
+            let mut any_usable = LaneMask::NONE;
+            for channel in 0..C {
+                let value = stored[channel].mul_add(scale, offset);
+                let missing = left_out | !value.abs().lt(Lane([f32::INFINITY; LANES]));
+                let clipped = !value.lt(Lane([stack.clip_level[channel]; LANES])) & !missing;
+                let usable = !(missing | clipped | value.lt(shadow_level));
+                let radiance = Lane::select(missing, zero, value);
+                let positive = radiance.max(zero);
+                let variance = positive.mul_add(positive.mul_add(relative_variance, photon), read_variance);
+                let irradiance = observation.irradiance[channel];
+                observation.radiance[channel] = radiance / irradiance;
+                observation.weight[channel] = Lane::select(usable, irradiance * irradiance / variance, zero);
+                any_usable = any_usable | usable;
+                self.clipped = self.clipped + Lane::select(clipped, one, zero);
+            }
+            self.usable_lights = self.usable_lights + Lane::select(any_usable, one, zero);
+        }
+    }
+}

@@ -1,0 +1,306 @@
+//! The Python module `impasto._core`: arrays in, arrays out. Nothing else in the crate knows Python.
+
+use crate::dispatch;
+use crate::geometry::{Illumination, Place};
+use crate::joint::Options;
+use crate::models::{FresnelAngle, Optics};
+use crate::observations::{Noise, Samples, Stack};
+use crate::record::Layout;
+use crate::render::{Parameters, View};
+use crate::separable::Loss;
+use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PySlice};
+
+fn invalid(message: impl Into<String>) -> PyErr {
+    PyValueError::new_err(message.into())
+}
+
+/// A model's name taken apart: "phong-no-ambient" is ("phong", false).
+fn parse_model(name: &str) -> PyResult<(&'static str, bool)> {
+    for entry in dispatch::entries() {
+        let suffix = if entry.ambient_by_default { "-no-ambient" } else { "-ambient" };
+        if name == entry.name {
+            return Ok((entry.name, entry.ambient_by_default));
+        }
+        if name.strip_suffix(suffix) == Some(entry.name) {
+            return Ok((entry.name, !entry.ambient_by_default));
+        }
+    }
+    Err(invalid(format!("no model is named {name:?}")))
+}
+
+fn parse_optics(index: f64, fresnel: &str) -> PyResult<Optics> {
+    let fresnel = match fresnel {
+        "facet" => FresnelAngle::Facet,
+        "element" => FresnelAngle::Element,
+        other => return Err(invalid(format!("fresnel is {other:?}, not \"facet\" or \"element\""))),
+    };
+    Ok(Optics { index, fresnel })
+}
+
+fn parse_loss(loss: &str, scale: f32) -> PyResult<Loss> {
+    match loss {
+        "linear" => Ok(Loss::Linear),
+        "cauchy" => Ok(Loss::Cauchy(scale)),
+        "huber" => Ok(Loss::Huber(scale)),
+        other => Err(invalid(format!("loss is {other:?}, not \"linear\", \"cauchy\" or \"huber\""))),
+    }
+}
+
+/// Rows of (direction, position); a position that is not NaN wins.
+fn parse_places(direction: &PyReadonlyArray2<f64>, position_mm: &PyReadonlyArray2<f64>) -> PyResult<Vec<Place>> {
+    let (direction, position_mm) = (direction.as_array(), position_mm.as_array());
+    if direction.ncols() != 3 || position_mm.dim() != direction.dim() {
+        return Err(invalid("light_direction and light_position_mm must both have shape (L, 3)"));
+    }
+    Ok(direction
+        .rows()
+        .into_iter()
+        .zip(position_mm.rows())
+        .map(
+            |(d, p)| {
+                if p[0].is_nan() { Place::Direction([d[0], d[1], d[2]]) } else { Place::Position([p[0], p[1], p[2]]) }
+            },
+        )
+        .collect())
+}
+
+fn parse_camera(view_direction: [f64; 3], distance_mm: Option<f64>) -> Place {
+    match distance_mm {
+        Some(distance) => Place::Position(view_direction.map(|x| x * distance)),
+        None => Place::Direction(view_direction),
+    }
+}
+
+fn check(name: &str, got: usize, expected: usize) -> PyResult<()> {
+    if got == expected { Ok(()) } else { Err(invalid(format!("{name} has {got} elements, expected {expected}"))) }
+}
+
+/// The names, shape parameters and properties of all models.
+#[pyfunction]
+fn models(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
+    dispatch::entries()
+        .into_iter()
+        .map(|entry| {
+            let shape: Vec<_> = entry.shape.iter().map(|s| (s.name, s.lower, s.upper, s.meaning)).collect();
+            let dict = PyDict::new(py);
+            dict.set_item("name", entry.name)?;
+            dict.set_item("title", entry.title)?;
+            dict.set_item("citations", entry.citations)?;
+            dict.set_item("shape", shape)?;
+            dict.set_item("lobes", entry.lobes)?;
+            dict.set_item("ambient_by_default", entry.ambient_by_default)?;
+            dict.set_item("reciprocal", entry.reciprocal)?;
+            Ok(dict)
+        })
+        .collect()
+}
+
+/// Whether the version for AVX2 and FMA runs on this processor.
+#[pyfunction]
+fn fast_instructions() -> bool {
+    dispatch::fast_instructions()
+}
+
+/// Fits a model to every pixel of a tile; see `impasto.fit`.
+#[pyfunction]
+#[pyo3(signature = (model, radiance, *, scale, offset, light_direction, light_position_mm, light_intensity,
+    view_direction, camera_distance_mm, position_mm, light_rgb, clip_level, shadow_level, sample_mask, noise, index,
+    fresnel, loss, loss_scale, max_steps))]
+#[allow(clippy::too_many_arguments)]
+fn fit<'py>(
+    py: Python<'py>,
+    model: &str,
+    radiance: &Bound<'py, PyAny>,
+    scale: f32,
+    offset: f32,
+    light_direction: PyReadonlyArray2<f64>,
+    light_position_mm: PyReadonlyArray2<f64>,
+    light_intensity: PyReadonlyArray2<f64>,
+    view_direction: [f64; 3],
+    camera_distance_mm: Option<f64>,
+    position_mm: Option<PyReadonlyArray2<f32>>,
+    light_rgb: Vec<f64>,
+    clip_level: Vec<f64>,
+    shadow_level: f32,
+    sample_mask: Option<PyReadonlyArray2<u8>>,
+    noise: (f32, f32, f32),
+    index: f64,
+    fresnel: &str,
+    loss: &str,
+    loss_scale: f32,
+    max_steps: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (name, ambient) = parse_model(model)?;
+    let options = Options { optics: parse_optics(index, fresnel)?, loss: parse_loss(loss, loss_scale)?, max_steps };
+    let as_u16 = radiance.extract::<PyReadonlyArray3<u16>>().ok();
+    let as_f32 = radiance.extract::<PyReadonlyArray3<f32>>().ok();
+    let (shape, samples) = match (&as_u16, &as_f32) {
+        (Some(array), _) => (array.as_array().dim(), Samples::U16(array.as_slice()?)),
+        (_, Some(array)) => (array.as_array().dim(), Samples::F32(array.as_slice()?)),
+        _ => return Err(invalid("radiance must be a uint16 or float32 array of shape (L, N, C)")),
+    };
+    let (lights, pixels, channels) = shape;
+    if channels != 1 && channels != 3 {
+        return Err(invalid(format!("radiance has {channels} channels, not 1 or 3")));
+    }
+    let places = parse_places(&light_direction, &light_position_mm)?;
+    check("light_direction", places.len(), lights)?;
+    check("light_intensity", light_intensity.len(), lights * channels)?;
+    check("light_rgb", light_rgb.len(), channels)?;
+    check("clip_level", clip_level.len(), channels)?;
+    let intensity = light_intensity.as_array().iter().map(|&x| x as f32).collect();
+    if let Some(mask) = &sample_mask {
+        check("sample_mask", mask.len(), lights * pixels)?;
+    }
+    let stack = Stack {
+        samples,
+        pixels,
+        scale,
+        offset,
+        lights: places,
+        intensity,
+        camera: parse_camera(view_direction, camera_distance_mm),
+        position_mm: position_mm.as_ref().map(|array| array.as_slice()).transpose()?,
+        clip_level: clip_level.iter().map(|&x| x as f32).collect(),
+        shadow_level,
+        sample_mask: sample_mask.as_ref().map(|array| array.as_slice()).transpose()?,
+        noise: Noise { read: noise.0, photon: noise.1, relative: noise.2 },
+    };
+    if stack.near() {
+        let Some(position) = stack.position_mm else {
+            return Err(invalid("a light or the camera is near: position_mm must say where the pixels are"));
+        };
+        check("position_mm", position.len(), 2 * pixels)?;
+    }
+    if pixels == 0 {
+        return Err(invalid("radiance has no pixels"));
+    }
+    let fitted = py
+        .detach(|| dispatch::fit(name, ambient, &stack, &light_rgb, options))
+        .expect("name and channels were checked");
+    into_dict(py, fitted.layout, fitted.rows, fitted.status)
+}
+
+/// Rows of a fit as one array per quantity, views of the same memory.
+fn into_dict(py: Python<'_>, layout: Layout, rows: Vec<f32>, status: Vec<u8>) -> PyResult<Bound<'_, PyDict>> {
+    let pixels = status.len();
+    let rows = rows.into_pyarray(py).reshape([pixels, layout.width()])?;
+    let dict = PyDict::new(py);
+    let all = PySlice::full(py);
+    let mut first = 0;
+    for (name, width) in layout.columns() {
+        let scalar = matches!(name, "chi2_reduced" | "residual_rms" | "normal_sd");
+        if scalar {
+            dict.set_item(name, rows.get_item((&all, first))?)?;
+        } else if width > 0 {
+            dict.set_item(name, rows.get_item((&all, PySlice::new(py, first as isize, (first + width) as isize, 1)))?)?;
+        }
+        first += width;
+    }
+    dict.set_item("status", status.into_pyarray(py))?;
+    Ok(dict)
+}
+
+/// Renders a tile under each light; see `impasto.render`.
+#[pyfunction]
+#[pyo3(signature = (model, normal, diffuse, specular, shape, ambient, *, light_direction, light_position_mm,
+    light_intensity, view_direction, camera_distance_mm, position_mm, light_rgb, index, fresnel))]
+#[allow(clippy::too_many_arguments)]
+fn render<'py>(
+    py: Python<'py>,
+    model: &str,
+    normal: PyReadonlyArray2<f32>,
+    diffuse: PyReadonlyArray2<f32>,
+    specular: PyReadonlyArray2<f32>,
+    shape: PyReadonlyArray2<f32>,
+    ambient: Option<PyReadonlyArray2<f32>>,
+    light_direction: PyReadonlyArray2<f64>,
+    light_position_mm: PyReadonlyArray2<f64>,
+    light_intensity: PyReadonlyArray2<f64>,
+    view_direction: [f64; 3],
+    camera_distance_mm: Option<f64>,
+    position_mm: Option<PyReadonlyArray2<f32>>,
+    light_rgb: Vec<f64>,
+    index: f64,
+    fresnel: &str,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (name, _) = parse_model(model)?;
+    let entry = dispatch::entries().into_iter().find(|entry| entry.name == name).expect("parsed from this list");
+    let optics = parse_optics(index, fresnel)?;
+    let places = parse_places(&light_direction, &light_position_mm)?;
+    let channels = light_rgb.len();
+    let parameters = Parameters {
+        pixels: normal.as_array().nrows(),
+        normal: normal.as_slice()?,
+        diffuse: diffuse.as_slice()?,
+        specular: specular.as_slice()?,
+        shape: shape.as_slice()?,
+        ambient: ambient.as_ref().map_or(Ok(&[][..]), |array| array.as_slice())?,
+    };
+    let pixels = parameters.pixels;
+    check("normal", parameters.normal.len(), 3 * pixels)?;
+    check("diffuse", parameters.diffuse.len(), channels * pixels)?;
+    check("specular", parameters.specular.len(), entry.lobes * pixels)?;
+    check("shape", parameters.shape.len(), entry.shape.len() * pixels)?;
+    if !parameters.ambient.is_empty() {
+        check("ambient", parameters.ambient.len(), channels * pixels)?;
+    }
+    check("light_intensity", light_intensity.len(), places.len() * channels)?;
+    let intensity: Vec<f32> = light_intensity.as_array().iter().map(|&x| x as f32).collect();
+    let camera = parse_camera(view_direction, camera_distance_mm);
+    let position_mm = position_mm.as_ref().map(|array| array.as_slice()).transpose()?;
+    if camera.near() || places.iter().any(Place::near) {
+        check("position_mm", position_mm.map_or(0, <[f32]>::len), 2 * pixels)?;
+    }
+    let mut radiance = vec![0.0; places.len() * pixels * channels];
+    if pixels > 0 {
+        py.detach(|| {
+            for (light, frame) in radiance.chunks_mut(pixels * channels).enumerate() {
+                let intensity = &intensity[light * channels..(light + 1) * channels];
+                let view = View { light: places[light], camera, intensity, colour: &light_rgb, position_mm };
+                dispatch::render(name, &parameters, &view, &optics, frame);
+            }
+        });
+    }
+    Ok(radiance.into_pyarray(py).reshape([places.len(), pixels, channels])?.into_any())
+}
+
+/// Basis values of a model in f64: one row (diffuse, lobe, …) for each row of directions and shapes.
+#[pyfunction]
+#[pyo3(signature = (model, normal, light, view, shape, *, index, fresnel))]
+#[allow(clippy::too_many_arguments)]
+fn basis<'py>(
+    py: Python<'py>,
+    model: &str,
+    normal: PyReadonlyArray2<f64>,
+    light: PyReadonlyArray2<f64>,
+    view: PyReadonlyArray2<f64>,
+    shape: PyReadonlyArray2<f64>,
+    index: f64,
+    fresnel: &str,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (name, _) = parse_model(model)?;
+    let optics = parse_optics(index, fresnel)?;
+    let rows = normal.as_array().nrows();
+    for (argument, array) in [("normal", &normal), ("light", &light), ("view", &view)] {
+        check(argument, array.len(), 3 * rows)?;
+    }
+    let vector = |rows: &PyReadonlyArray2<f64>, row: usize| std::array::from_fn(|i| rows.as_array()[[row, i]]);
+    let mut values = Vec::new();
+    for row in 0..rows {
+        let at = Illumination::new(vector(&light, row), vector(&view, row));
+        let shape: Vec<f64> = shape.as_array().row(row).to_vec();
+        values.extend(dispatch::basis(name, vector(&normal, row), &shape, &at, &optics).expect("parsed from the list"));
+    }
+    let width = values.len().checked_div(rows).unwrap_or(0);
+    Ok(values.into_pyarray(py).reshape([rows, width])?.into_any())
+}
+
+#[pymodule]
+mod _core {
+    #[pymodule_export]
+    use super::{basis, fast_instructions, fit, models, render};
+}

@@ -1,0 +1,392 @@
+//! The reflectance of a pixel as a separable least-squares problem.
+//!
+//! Radiance is linear in the magnitudes and nonlinear only in the normal and the shape. Variable projection (Golub & Pereyra
+//! 1973, with Kaufman's simplification of the Jacobian, 1975) eliminates the magnitudes at every step: what remains has two
+//! parameters for the normal and one for each shape parameter.
+
+use crate::arrow::{Arrow, Free, Magnitudes};
+use crate::dual::Dual;
+use crate::geometry::{Illumination, normalise, tangents};
+use crate::lanes::{Lane, LaneMask, outlined};
+use crate::minimise::{Objective, Quadratic};
+use crate::models::{Basis, MAX_LOBES, MAX_SHAPE, Model, Optics};
+use crate::number::{Mask, Number, Real, array};
+use crate::observations::Observation;
+use std::marker::PhantomData;
+
+/// Normals may tilt up to 84° from the painting's normal: beyond that no camera in front sees the element.
+pub const NORMAL_Z_MIN: f64 = 0.1;
+/// A step turns the normal by at most this angle in radians …
+const TURN_MAX: f64 = 0.5;
+/// … and changes the logarithm of a shape parameter by at most this.
+const SHAPE_STEP_MAX: f64 = 1.2;
+
+/// How residuals far outside the noise are treated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Loss {
+    /// Plain least squares.
+    Linear,
+    /// ρ(r²) = k² ln(1 + r²/k²).
+    Cauchy(f32),
+    /// ρ(r²) = r² up to k, then 2 k |r| − k².
+    Huber(f32),
+}
+
+/// Normal and logarithms of the shape parameters.
+#[derive(Clone, Copy)]
+pub struct Point<const FMA: bool> {
+    pub normal: [Lane<FMA>; 3],
+    pub shape_log: [Lane<FMA>; MAX_SHAPE],
+}
+
+/// P is 2 + the number of shape parameters.
+pub struct Separable<'a, M, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool> {
+    pub observations: &'a [Observation<FMA, C>],
+    pub illuminations: &'a [Illumination<Lane<FMA>>],
+    pub colour: [Lane<FMA>; C],
+    pub optics: Optics,
+    pub loss: Loss,
+    /// Specular magnitude where it is known beforehand, as one value for a whole sample.
+    pub fixed_specular: Option<[Lane<FMA>; MAX_LOBES]>,
+    /// Factor of each sample's weight from the robust loss, refreshed at every accepted point.
+    pub robust: Vec<[Lane<FMA>; C]>,
+    pub basis: Vec<Basis<Dual<Lane<FMA>, P>>>,
+    pub model: PhantomData<M>,
+}
+
+/// A point's magnitudes and everything that uncertainties are made from.
+pub struct Solution<const FMA: bool, const C: usize, const P: usize> {
+    pub quadratic: Quadratic<FMA, P>,
+    pub magnitudes: Magnitudes<FMA, C>,
+    pub arrow: Arrow<FMA, C>,
+    pub free: Free<C>,
+    /// For each nonlinear parameter, how the magnitudes follow it: −∂(magnitudes)/∂(parameter).
+    pub following: [Magnitudes<FMA, C>; P],
+}
+
+/// sᵀ Σ s: the variance of a quantity with slopes s along parameters of covariance Σ.
+#[inline(always)]
+fn propagated<const FMA: bool, const P: usize>(slopes: [Lane<FMA>; P], covariance: &[[Lane<FMA>; P]; P]) -> Lane<FMA> {
+    let mut sum = Lane::splat(0.0);
+    for p in 0..P {
+        for q in 0..P {
+            sum = (slopes[p] * covariance[p][q]).mul_add(slopes[q], sum);
+        }
+    }
+    sum
+}
+
+impl<const FMA: bool, const C: usize, const P: usize> Solution<FMA, C, P> {
+    /// Marginal variances of the magnitudes, from the covariance of the nonlinear parameters: those of the linear problem
+    /// at a known normal and shape, plus what follows from not knowing these.
+    #[inline(always)]
+    pub fn magnitude_variances<const AMBIENT: bool>(
+        &self,
+        lobes: usize,
+        covariance: &[[Lane<FMA>; P]; P],
+    ) -> Magnitudes<FMA, C> {
+        let factored = self.arrow.factor::<AMBIENT>(lobes, &self.free);
+        let one = Lane::splat(1.0);
+        let mut variances = Magnitudes::zero();
+        for k in 0..C {
+            let mut unit = Magnitudes::zero();
+            unit.diffuse[k] = one;
+            variances.diffuse[k] = factored.solve::<AMBIENT>(&unit).diffuse[k]
+                + propagated(array!(|p| self.following[p].diffuse[k]), covariance);
+            if AMBIENT {
+                let mut unit = Magnitudes::zero();
+                unit.ambient[k] = one;
+                variances.ambient[k] = factored.solve::<AMBIENT>(&unit).ambient[k]
+                    + propagated(array!(|p| self.following[p].ambient[k]), covariance);
+            }
+        }
+        for j in 0..lobes {
+            let mut unit = Magnitudes::zero();
+            unit.specular[j] = one;
+            variances.specular[j] = factored.solve::<AMBIENT>(&unit).specular[j]
+                + propagated(array!(|p| self.following[p].specular[j]), covariance);
+        }
+        variances
+    }
+}
+
+impl<M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool>
+    Separable<'_, M, FMA, C, P, AMBIENT>
+{
+    #[inline(always)]
+    fn free_lobes(&self) -> usize {
+        if self.fixed_specular.is_some() { 0 } else { M::LOBES }
+    }
+
+    #[inline(always)]
+    fn weight(&self, light: usize) -> [Lane<FMA>; C] {
+        let weight = self.observations[light].weight;
+        if self.loss == Loss::Linear {
+            return weight;
+        }
+        array!(|k| weight[k] * self.robust[light][k])
+    }
+
+    /// The basis functions at a point, with their derivatives by (tangent, tangent, ln shape …).
+    #[inline(always)]
+    fn evaluate_basis(&mut self, point: &Point<FMA>) {
+        let (first, second) = tangents(point.normal);
+        let normal = array!(|i| {
+            let mut component = Dual::constant(point.normal[i]);
+            component.derivative[0] = first[i];
+            component.derivative[1] = second[i];
+            component
+        });
+        let mut shape = [Dual::constant(Lane::splat(0.0)); MAX_SHAPE];
+        for i in 0..P - 2 {
+            let value = point.shape_log[i].exp();
+            shape[i] = Dual::parameter(value, 2 + i, value);
+        }
+        for (basis, at) in self.basis.iter_mut().zip(self.illuminations) {
+            *basis = M::basis(normal, &shape[..P - 2], at, &self.optics);
+        }
+    }
+
+    #[inline(always)]
+    fn lobe_sum(&self, magnitudes: &Magnitudes<FMA, C>, light: usize) -> Dual<Lane<FMA>, P> {
+        let mut sum = Dual::constant(Lane::splat(0.0));
+        for j in 0..M::LOBES {
+            sum = self.basis[light].specular[j].scale_add(magnitudes.specular[j], sum);
+        }
+        sum
+    }
+
+    /// Solves for the magnitudes at a point, then takes the cost and its derivatives there.
+    #[inline(always)]
+    pub fn solve(&mut self, point: &Point<FMA>) -> Solution<FMA, C, P> {
+        outlined::<FMA, _>(
+            #[inline(always)]
+            || self.solve_inline(point),
+        )
+    }
+
+    #[inline(always)]
+    fn solve_inline(&mut self, point: &Point<FMA>) -> Solution<FMA, C, P> {
+        self.evaluate_basis(point);
+        let zero = Lane::splat(0.0);
+        let lobes = self.free_lobes();
+
+        let mut arrow = Arrow::zero();
+        for (light, observation) in self.observations.iter().enumerate() {
+            let basis = &self.basis[light];
+            let mut radiance = observation.radiance;
+            if let Some(fixed) = self.fixed_specular {
+                for j in 0..M::LOBES {
+                    for k in 0..C {
+                        radiance[k] = radiance[k] - self.colour[k] * fixed[j] * basis.specular[j].value;
+                    }
+                }
+            }
+            let specular = array!(|j| basis.specular[j].value);
+            arrow.add::<AMBIENT>(lobes, basis.diffuse.value, &specular, &radiance, &self.weight(light), &self.colour);
+        }
+        let mut free = Free::new(lobes, AMBIENT);
+        let mut magnitudes = arrow.magnitudes::<AMBIENT>(lobes, &mut free);
+        if let Some(fixed) = self.fixed_specular {
+            magnitudes.specular = fixed;
+        }
+
+        let mut quadratic = Quadratic::zero();
+        // JᵀWΦ, one vector of the magnitudes' shape for each nonlinear parameter.
+        let mut projection = [Magnitudes::zero(); P];
+        for (light, observation) in self.observations.iter().enumerate() {
+            let basis = &self.basis[light];
+            let weight = self.weight(light);
+            let sum = self.lobe_sum(&magnitudes, light);
+            let mut lobe_projection = [zero; P];
+            for k in 0..C {
+                let diffuse = magnitudes.diffuse[k];
+                let mut residual = observation.radiance[k];
+                if AMBIENT {
+                    residual = residual - magnitudes.ambient[k];
+                }
+                residual = residual - diffuse * basis.diffuse.value;
+                if M::LOBES > 0 {
+                    residual = residual - self.colour[k] * sum.value;
+                }
+                quadratic.cost = quadratic.cost + self.cost_of(weight[k], observation.weight[k], residual);
+                let weighted_residual = weight[k] * residual;
+                let mut weighted_slope = [zero; P];
+                let mut slope = [zero; P];
+                for p in 0..P {
+                    slope[p] = diffuse * basis.diffuse.derivative[p];
+                    if M::LOBES > 0 {
+                        slope[p] = self.colour[k].mul_add(sum.derivative[p], slope[p]);
+                    }
+                    weighted_slope[p] = weight[k] * slope[p];
+                    quadratic.descent[p] = slope[p].mul_add(weighted_residual, quadratic.descent[p]);
+                    projection[p].diffuse[k] = weighted_slope[p].mul_add(basis.diffuse.value, projection[p].diffuse[k]);
+                    if AMBIENT {
+                        projection[p].ambient[k] = projection[p].ambient[k] + weighted_slope[p];
+                    }
+                    if lobes > 0 {
+                        lobe_projection[p] = self.colour[k].mul_add(weighted_slope[p], lobe_projection[p]);
+                    }
+                }
+                for p in 0..P {
+                    for q in p..P {
+                        quadratic.hessian[p][q] = weighted_slope[p].mul_add(slope[q], quadratic.hessian[p][q]);
+                    }
+                }
+            }
+            for p in 0..P {
+                for j in 0..lobes {
+                    projection[p].specular[j] =
+                        lobe_projection[p].mul_add(basis.specular[j].value, projection[p].specular[j]);
+                }
+            }
+        }
+
+        // What the magnitudes can absorb of a step is taken out of the Hessian.
+        let mut following = [Magnitudes::zero(); P];
+        {
+            let factored = arrow.factor::<AMBIENT>(lobes, &free);
+            for p in 0..P {
+                following[p] = factored.solve::<AMBIENT>(&projection[p]);
+            }
+        }
+        for p in 0..P {
+            // Rounding may leave less than nothing of a parameter that the magnitudes absorb whole.
+            let floor = quadratic.hessian[p][p] * Lane::splat(1e-6);
+            for q in p..P {
+                quadratic.hessian[p][q] = quadratic.hessian[p][q] - projection[q].dot(&following[p]);
+            }
+            quadratic.hessian[p][p] = quadratic.hessian[p][p].max(floor);
+        }
+        Solution { quadratic, magnitudes, arrow, free, following }
+    }
+
+    /// ρ of a residual; `weight` includes the robust factor, `plain` does not.
+    #[inline(always)]
+    fn cost_of(&self, weight: Lane<FMA>, plain: Lane<FMA>, residual: Lane<FMA>) -> Lane<FMA> {
+        match self.loss {
+            Loss::Linear => weight * residual * residual,
+            Loss::Cauchy(k) => {
+                let k_squared = Lane::splat(f64::from(k * k));
+                k_squared * (plain * residual * residual / k_squared).ln_1p()
+            }
+            Loss::Huber(k) => {
+                let k = Lane::splat(f64::from(k));
+                let squared = plain * residual * residual;
+                let linear = (k + k) * squared.sqrt() - k * k;
+                Lane::select(squared.lt(k * k), squared, linear)
+            }
+        }
+    }
+
+    /// The radiance that the model gives at a light, per unit of irradiance.
+    #[inline(always)]
+    pub fn predicted(&self, magnitudes: &Magnitudes<FMA, C>, light: usize) -> [Lane<FMA>; C] {
+        let sum = self.lobe_sum(magnitudes, light).value;
+        array!(|k| {
+            let diffuse = magnitudes.diffuse[k].mul_add(self.basis[light].diffuse.value, magnitudes.ambient[k]);
+            self.colour[k].mul_add(sum, diffuse)
+        })
+    }
+
+    /// Robust factors from the residuals at a point: iteratively reweighted least squares.
+    #[inline(always)]
+    fn reweight(&mut self, magnitudes: &Magnitudes<FMA, C>, mask: LaneMask) {
+        let one = Lane::splat(1.0);
+        for (light, observation) in self.observations.iter().enumerate() {
+            let predicted = self.predicted(magnitudes, light);
+            for k in 0..C {
+                let residual = observation.radiance[k] - predicted[k];
+                let squared = observation.weight[k] * residual * residual;
+                let factor = match self.loss {
+                    Loss::Linear => one,
+                    Loss::Cauchy(s) => one / (one + squared / Lane::splat(f64::from(s * s))),
+                    Loss::Huber(s) => (Lane::splat(f64::from(s)) / squared.sqrt()).min(one),
+                };
+                self.robust[light][k] = Lane::select(mask, factor, self.robust[light][k]);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn shape_bounds(index: usize) -> (Lane<FMA>, Lane<FMA>) {
+        let parameter = M::SHAPE[index];
+        (Lane::splat(parameter.lower.ln()), Lane::splat(parameter.upper.ln()))
+    }
+
+    /// Lanes with a parameter or a magnitude at its bound.
+    #[inline(always)]
+    pub fn at_bound(&self, point: &Point<FMA>, magnitudes: &Magnitudes<FMA, C>) -> LaneMask {
+        let zero = Lane::splat(0.0);
+        let mut bound = !point.normal[2].gt(Lane::splat(NORMAL_Z_MIN * 1.001));
+        for i in 0..P - 2 {
+            let (lower, upper) = Self::shape_bounds(i);
+            bound = bound | !point.shape_log[i].gt(lower) | !point.shape_log[i].lt(upper);
+        }
+        for k in 0..C {
+            bound = bound | !magnitudes.diffuse[k].gt(zero);
+        }
+        for j in 0..M::LOBES {
+            bound = bound | !magnitudes.specular[j].gt(zero);
+        }
+        bound
+    }
+}
+
+impl<M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool> Objective<FMA, P>
+    for Separable<'_, M, FMA, C, P, AMBIENT>
+{
+    type Point = Point<FMA>;
+
+    #[inline(always)]
+    fn quadratic(&mut self, point: &Point<FMA>) -> Quadratic<FMA, P> {
+        self.solve(point).quadratic
+    }
+
+    #[inline(always)]
+    fn moved(&self, point: &Point<FMA>, step: &[Lane<FMA>; P]) -> Point<FMA> {
+        let length = (step[0] * step[0] + step[1] * step[1]).sqrt().max(Lane::splat(1e-20));
+        let shorten = (Lane::splat(TURN_MAX) / length).min(Lane::splat(1.0));
+        let (first, second) = tangents(point.normal);
+        let mut turned: [Lane<FMA>; 3] =
+            array!(|i| point.normal[i] + shorten * (step[0] * first[i] + step[1] * second[i]));
+        turned[2] = turned[2].max(Lane::splat(NORMAL_Z_MIN));
+        let mut shape_log = point.shape_log;
+        for i in 0..P - 2 {
+            let (lower, upper) = Self::shape_bounds(i);
+            let limit = Lane::splat(SHAPE_STEP_MAX);
+            let change = step[2 + i].min(limit).max(-limit);
+            shape_log[i] = (shape_log[i] + change).max(lower).min(upper);
+        }
+        Point { normal: normalise(turned), shape_log }
+    }
+
+    #[inline(always)]
+    fn blocked(&self, point: &Point<FMA>, descent: &[Lane<FMA>; P]) -> [LaneMask; P] {
+        let zero = Lane::splat(0.0);
+        let mut blocked = [LaneMask::NONE; P];
+        for i in 0..P - 2 {
+            let (lower, upper) = Self::shape_bounds(i);
+            let low = !point.shape_log[i].gt(lower) & descent[2 + i].lt(zero);
+            let high = !point.shape_log[i].lt(upper) & descent[2 + i].gt(zero);
+            blocked[2 + i] = low | high;
+        }
+        blocked
+    }
+
+    #[inline(always)]
+    fn select(mask: LaneMask, yes: &Point<FMA>, no: &Point<FMA>) -> Point<FMA> {
+        Point {
+            normal: array!(|i| Lane::select(mask, yes.normal[i], no.normal[i])),
+            shape_log: array!(|i| Lane::select(mask, yes.shape_log[i], no.shape_log[i])),
+        }
+    }
+
+    #[inline(always)]
+    fn accepted(&mut self, point: &Point<FMA>, mask: LaneMask) {
+        if self.loss != Loss::Linear && mask.any() {
+            let magnitudes = self.solve(point).magnitudes;
+            self.reweight(&magnitudes, mask);
+        }
+    }
+}

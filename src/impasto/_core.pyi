@@ -1,0 +1,58 @@
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+def models() -> list[dict[str, Any]]: ...
+def fast_instructions() -> bool: ...
+def fit(
+    model: str,
+    radiance: NDArray[np.uint16] | NDArray[np.float32],
+    *,
+    scale: float,
+    offset: float,
+    light_direction: NDArray[np.float64],
+    light_position_mm: NDArray[np.float64],
+    light_intensity: NDArray[np.float64],
+    view_direction: NDArray[np.float64],
+    camera_distance_mm: float | None,
+    position_mm: NDArray[np.float32] | None,
+    light_rgb: NDArray[np.float64],
+    clip_level: NDArray[np.float64],
+    shadow_level: float,
+    sample_mask: NDArray[np.uint8] | None,
+    noise: tuple[float, float, float],
+    index: float,
+    fresnel: str,
+    loss: str,
+    loss_scale: float,
+    max_steps: int,
+) -> dict[str, NDArray[Any]]: ...
+def render(
+    model: str,
+    normal: NDArray[np.float32],
+    diffuse: NDArray[np.float32],
+    specular: NDArray[np.float32],
+    shape: NDArray[np.float32],
+    ambient: NDArray[np.float32] | None,
+    *,
+    light_direction: NDArray[np.float64],
+    light_position_mm: NDArray[np.float64],
+    light_intensity: NDArray[np.float64],
+    view_direction: NDArray[np.float64],
+    camera_distance_mm: float | None,
+    position_mm: NDArray[np.float32] | None,
+    light_rgb: NDArray[np.float64],
+    index: float,
+    fresnel: str,
+) -> NDArray[np.float32]: ...
+def basis(
+    model: str,
+    normal: NDArray[np.float64],
+    light: NDArray[np.float64],
+    view: NDArray[np.float64],
+    shape: NDArray[np.float64],
+    *,
+    index: float,
+    fresnel: str,
+) -> NDArray[np.float64]: ...
