@@ -1,0 +1,138 @@
+"""Measure everything in one run, print a table and write it beside this file: python -m benchmarks.
+
+--quick takes a tenth of the pixels, to see that the benchmarks run; its figures mean nothing, and it writes
+quick.json and quick.md instead of results.json and results.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+
+from benchmarks import accuracy, procedures, speed, whole
+from benchmarks.photographs import write_capture
+from benchmarks.problem import LIGHTS, light_directions, simulate
+from benchmarks.report import Row, write
+
+SCIPY_BAR = 800
+WHOLE_BAR = 1.4
+MEMORY_BAR_GB = 1.5
+# The residual's median is 0.997 for any correct fit; above this the fit does not reach the noise.
+RESIDUAL_SLACK = 1.005
+
+
+def accuracy_rows(pixels: int) -> list[Row]:
+    """Compare the joint fit's errors with the figures to beat and with the Cramér-Rao bound."""
+    problem = simulate(pixels)
+    reached = accuracy.figures(problem, speed.fit_core(problem))
+    least = accuracy.bound(min(pixels, 20_000))
+    rows = []
+    for what, bar in accuracy.BARS.items():
+        slack = RESIDUAL_SLACK if what.startswith("residual") else 1
+        rows.append(Row(what, reached[what], bar * slack, note=f"bound {least[what]:.3g}"))
+    return rows
+
+
+def speed_rows(pixels: int, scipy_pixels: int, threads: int) -> list[Row]:
+    """Compare pixels per second of processor time with scipy's, and the solutions themselves."""
+    core = speed.measure("core", pixels)
+    shared = speed.measure("core", pixels, threads)
+    rows = [
+        Row("impasto joint fit, px per CPU-second", pixels / core["cpu_s"], note="one thread"),
+        Row("impasto joint fit, px/s", pixels / shared["wall_s"], note=f"{threads} threads"),
+    ]
+    for method, title in (("trf", "scipy TRF"), ("lm", "scipy LM")):
+        scipy = speed.measure(method, scipy_pixels)
+        per_second = scipy_pixels / scipy["cpu_s"]
+        same = speed.same_solution(core, scipy)
+        rows += [
+            Row(f"{title}, px per CPU-second", per_second),
+            Row(
+                f"impasto over {title}",
+                pixels / core["cpu_s"] / per_second,
+                SCIPY_BAR if method == "trf" else None,
+                at_least=True,
+            ),
+            Row(
+                f"same solution as {title}, share of pixels",
+                same["agreeing"],
+                0.995,
+                at_least=True,
+                note=f"elsewhere χ² is lower for impasto in {same['core_better']:.2%}, for scipy in "
+                f"{same['scipy_better']:.2%}; differences {same['normal_difference_deg']:.1e}° and "
+                f"{same['c_difference_relative']:.1e} of c (99th percentile)",
+            ),
+        ]
+    return rows
+
+
+def procedure_rows(folder: Path, side_px: int) -> list[Row]:
+    """Compare the paper procedure with the joint one."""
+    speeds = procedures.measure(folder, side_px)
+    return [
+        Row("joint procedure, px per CPU-second", speeds["joint"], note=f"{LIGHTS} lights in a dome"),
+        Row(
+            "paper procedure, px per CPU-second",
+            speeds["paper"],
+            speeds["joint"],
+            at_least=True,
+            note=f"{LIGHTS} lights on an arm; the bar is the joint procedure",
+        ),
+    ]
+
+
+def whole_rows(folder: Path, sizes: list[tuple[int, int]]) -> list[Row]:
+    """Time `impasto stack` and `impasto fit`, and their memory, at each size."""
+    rows = []
+    for height, width in sizes:
+        capture = write_capture(folder / f"{width}x{height}", light_directions(), height, width)
+        measured = whole.measure(capture, folder / f"{width}x{height}.zarr")
+        title = f"{LIGHTS} × {measured['megapixels']:.1f} Mpx"
+        rows += [
+            Row(f"{title}: stack, s", measured["stack"]["wall_s"]),
+            Row(f"{title}: fit, s", measured["fit"]["wall_s"]),
+            Row(f"{title}: decoding alone, s", measured["decode_alone_s"]),
+            Row(f"{title}: fit from memory alone, s", measured["fit_alone_s"]),
+            Row(f"{title}: whole over both alone", measured["ratio"], WHOLE_BAR),
+            Row(f"{title}: peak memory, GB", measured["peak_gb"], MEMORY_BAR_GB),
+        ]
+        for file in capture.files:
+            file.unlink()
+    return rows
+
+
+def main() -> int:
+    """Run the sections asked for and return how many figures miss their bar."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="a tenth of the pixels")
+    parser.add_argument(
+        "--only",
+        choices=["accuracy", "speed", "procedures", "whole"],
+        help="one section; prints, writes nothing",
+    )
+    parser.add_argument("--folder", type=Path, help="where to put the photographs and stores (about 8 GB)")
+    arguments = parser.parse_args()
+    share = 10 if arguments.quick else 1
+    with tempfile.TemporaryDirectory(dir=arguments.folder) as name:
+        folder = Path(name)
+        sizes = [(512, 768), (768, 1024)] if arguments.quick else [(2048, 2048), (4096, 4096)]
+        sections = {
+            "accuracy": ("Accuracy", lambda: accuracy_rows(200_000 // share)),
+            "speed": ("Speed", lambda: speed_rows(200_000 // share, 3000 // share, 2)),
+            "procedures": ("Procedures", lambda: procedure_rows(folder, 1024 if share == 1 else 320)),
+            "whole": ("From photographs to maps", lambda: whole_rows(folder, sizes)),
+        }
+        chosen = [arguments.only] if arguments.only else list(sections)
+        rows = {}
+        for section in chosen:
+            title, measure = sections[section]
+            print(f"{title} …", flush=True)
+            rows[title] = measure()
+        destination = folder if arguments.only else Path(__file__).parent
+        print(write(rows, destination, "quick" if arguments.quick else "results"))
+    return sum(row.met is False for section in rows.values() for row in section)
+
+
+if __name__ == "__main__":
+    raise SystemExit(1 if main() else 0)

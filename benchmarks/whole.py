@@ -1,0 +1,117 @@
+"""The whole way from photographs to maps, against what cannot be avoided: decoding and fitting, each alone.
+
+`python -m benchmarks.whole decode|memory FOLDER` measures one of the two floors and prints seconds.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from benchmarks.photographs import WHITE, Capture
+from benchmarks.problem import INDEX, MODEL, NOISE, VIEW_DIRECTION, light_directions
+
+# Pixels held in memory for the fit alone; a larger picture is the same blocks again.
+MEMORY_PX = 1 << 20
+
+
+def run(command: list[str]) -> dict[str, float]:
+    """Run a command to its end and return its wall time, processor time and peak memory.
+
+    Raises
+    ------
+    subprocess.CalledProcessError
+        If it fails.
+    """
+    started = time.perf_counter()
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    _, status, used = os.wait4(process.pid, 0)
+    wall = time.perf_counter() - started
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command)
+    # Linux counts kilobytes.
+    return {"wall_s": wall, "cpu_s": used.ru_utime + used.ru_stime, "peak_gb": used.ru_maxrss * 1024 / 1e9}
+
+
+def impasto(*arguments: str) -> dict[str, float]:
+    """Run the command line as a user would; see `run`."""
+    return run([str(Path(sys.executable).with_name("impasto")), *arguments])
+
+
+def measure(capture: Capture, store: Path) -> dict[str, Any]:
+    """Time `impasto stack` and `impasto fit` on a capture, and the two floors."""
+    shutil.rmtree(store, ignore_errors=True)
+    floors = {what: _floor(what, capture.folder) for what in ("decode", "memory")}
+    fit_alone = floors["memory"]["seconds"] * capture.pixels / floors["memory"]["pixels"]
+    stack = impasto("stack", str(capture.folder), str(store))
+    fit = impasto("fit", str(store), "--model", MODEL)
+    alone = floors["decode"]["seconds"] + fit_alone
+    return {
+        "megapixels": capture.pixels / 1e6,
+        "photographs": len(capture.files),
+        "stack": stack,
+        "fit": fit,
+        "decode_alone_s": floors["decode"]["seconds"],
+        "fit_alone_s": fit_alone,
+        "ratio": (stack["wall_s"] + fit["wall_s"]) / alone,
+        "peak_gb": max(stack["peak_gb"], fit["peak_gb"]),
+    }
+
+
+def _floor(what: str, folder: Path) -> dict[str, float]:
+    command = [sys.executable, "-m", "benchmarks.whole", what, str(folder)]
+    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+def _decode(files: list[Path]) -> dict[str, float]:
+    """Decode every file on all cores by tifffile, and throw the pixels away."""
+    import tifffile
+
+    started = time.perf_counter()
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        sizes = list(pool.map(lambda file: tifffile.imread(file, maxworkers=1).size, files))
+    return {"seconds": time.perf_counter() - started, "pixels": sizes[0] / 3}
+
+
+def _fit_memory(files: list[Path]) -> dict[str, float]:
+    """Fit the first rows of the photographs from memory, on all cores."""
+    import tifffile
+
+    from impasto.fit import FitOptions, fit_tile
+    from impasto.geometry import Camera, Lights
+    from impasto.models import parse_model
+
+    tiles = []
+    for file in files:
+        image = tifffile.imread(file)
+        tiles.append(image[: max(1, MEMORY_PX // image.shape[1])].reshape(-1, 3))
+    radiance = np.stack(tiles)
+    white = 65535 / WHITE
+    settings: dict[str, Any] = {
+        "lights": Lights(tuple(file.stem for file in files), light_directions()),
+        "camera": Camera(np.array(VIEW_DIRECTION)),
+        "light_rgb": np.ones(3),
+        "clip_level": np.full(3, 0.99),
+        "noise": (NOISE[0] / white, NOISE[1] / white, NOISE[2]),
+        "scale": 1 / 65535,
+        "options": FitOptions(index=INDEX),
+    }
+    model = parse_model(MODEL)
+    fit_tile(model, radiance[:, :4096], **settings)
+    started = time.perf_counter()
+    fit_tile(model, radiance, **settings)
+    return {"seconds": time.perf_counter() - started, "pixels": radiance.shape[1]}
+
+
+if __name__ == "__main__":
+    photographs = sorted(Path(sys.argv[2]).glob("*.tif"))
+    print(json.dumps({"decode": _decode, "memory": _fit_memory}[sys.argv[1]](photographs)))
