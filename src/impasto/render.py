@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
 from os import PathLike
@@ -150,14 +152,21 @@ def render(
             index = range(first, min(first + _LIGHTS_AT_A_TIME, len(wanted)))
             group = wanted.select(index)
             missing = matte = 0
-            with _Pictures(folder, group.names, fit.shape, channels, spec.title, exposure, raw) as pictures:
+            with (
+                _Pictures(folder, group.names, fit.shape, channels, spec.title, exposure, raw) as pictures,
+                ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="encode") as encoders,
+            ):
                 for band in render_bands(fit, group, stack.camera):
                     missing += band.missing_pixels
                     matte += band.matte_pixels
+                    done = [
+                        encoders.submit(pictures.write, number, radiance)
+                        for number, radiance in enumerate(band.radiance)
+                    ]
                     for number, radiance in enumerate(band.radiance):
-                        pictures.write(number, radiance)
                         if animation:
                             animation.add(first + number, band.rows, radiance, exposure)
+                        done[number].result()
                         advance(radiance.shape[0])
             files += pictures.files
             too_bright = max(too_bright, pictures.too_bright)
