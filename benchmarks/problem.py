@@ -1,9 +1,9 @@
 """The fixed problem that accuracy and speed are measured on: lights, surfaces and noise, all constants.
 
 40 lights, RGB, one Torrance-Sparrow lobe with Trowbridge-Reitz facets per pixel, c log-uniform from 0.02 to
-0.9, noise of 0.5 % + 1e-4. What the figures to beat leave open (lights, tilts, albedo, κ) was searched for such
-that the Cramér-Rao bound lies 5 to 35 % under those figures; README.md tells how, and what that means. The
-accuracy table prints the bound beside the measurement.
+0.9, noise of 0.5 % + 1e-4. What the figures to beat leave open (lights, tilts, albedo, κ) was searched for
+such that the Cramér-Rao bound lies 5 to 35 % under those figures; README.md tells how, and what that means.
+The accuracy table prints the bound beside the measurement.
 
 Radiances come from the float64 reference models of the tests, which share no code with the package.
 """
