@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,11 +75,11 @@ def draw_values(
     bar = figure.add_axes(
         (box.x0 + box.width * 0.12, box.y0 + box.height * 0.1, box.width * 0.16, box.height * 0.86)
     )
-    colour_bar = figure.colorbar(
-        image, cax=bar, extend=extend[below, above], format="%g" if logarithmic else None
-    )
+    colour_bar = figure.colorbar(image, cax=bar, extend=extend[below, above])
+    if logarithmic:
+        _label_decades(bar, narrow=high < 100 * low)
     colour_bar.set_label(label, color=_INK, fontsize=_TEXT_PT)
-    bar.tick_params(labelsize=_TEXT_PT)
+    bar.tick_params(labelsize=_TEXT_PT, which="both")
     if not np.isfinite(values).all():
         _legend(side, [(_MISSING, "no value")])
     _save(figure, path)
@@ -184,10 +184,16 @@ def draw_status(
     _save(figure, path)
 
 
-def reduce(values: NDArray[Any], longest: int) -> NDArray[Any]:
-    """Return every k-th pixel of a map so that its longer side has at most `longest` pixels."""
-    step = -(-max(values.shape[:2]) // longest)
-    return values[step // 2 :: step, step // 2 :: step]
+def _label_decades(bar: Axes, narrow: bool) -> None:
+    """Label a logarithmic colour bar in plain figures, between the decades too if they are few."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    bar.yaxis.set_major_formatter("{x:g}")
+    if narrow:
+        bar.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+        bar.yaxis.set_minor_formatter("{x:g}")
+    else:
+        bar.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _share(share: float) -> str:
