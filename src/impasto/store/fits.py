@@ -20,6 +20,7 @@ from impasto.store.hierarchy import (
     fit_group,
     has_array,
     open_array,
+    open_sharded,
     read_group,
     remove,
     source_problems,
@@ -74,7 +75,7 @@ class MapsWriter:
         for map in maps:
             if not has_array(store, f"{group}/{map.name}"):
                 create_map(store, group, map, height, width)
-        self._arrays = {map.name: open_array(store, f"{group}/{map.name}", write=True) for map in maps}
+        self._arrays = {map.name: open_sharded(store, f"{group}/{map.name}") for map in maps}
 
     def _shard(self, map: Map, unit: Unit) -> Path:
         last = () if map.axis is None else ("0",)
@@ -87,7 +88,7 @@ class MapsWriter:
             return False
         try:
             self._arrays["status"][unit.rows, unit.columns]
-        except (OSError, RuntimeError, ValueError):  # cut short by a kill or a full disk
+        except (OSError, RuntimeError, ValueError):  # damaged: as good as not there
             return False
         return True
 
@@ -116,7 +117,7 @@ class MapsWriter:
     def begin(self, unit: Unit) -> None:
         """Forget what there is of a unit.
 
-        Shards that a kill cut short would be read, and found damaged, where the image ends inside of them.
+        Where the image ends inside of a shard, what is there would be read first, and might be damaged.
         """
         for map in reversed(self.maps):
             self._shard(map, unit).unlink(missing_ok=True)

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,16 +27,19 @@ if TYPE_CHECKING:
 
 Attributes = dict[str, Any]
 
+_RUST = "zarrs.ZarrsCodecPipeline"
+_PYTHON = "zarr.core.codec_pipeline.BatchedCodecPipeline"
+
 # zarr's configuration is global to the process, and so is this lock.
 _configuring = threading.Lock()
 
 
 @contextmanager
-def _pipeline() -> Iterator[None]:
-    """Have arrays opened inside use the Rust codecs, without changing zarr for the rest of the program."""
+def _pipeline(path: str = _RUST) -> Iterator[None]:
+    """Have arrays opened inside use a codec pipeline, without changing zarr for the rest of the program."""
     import zarr
 
-    with _configuring, zarr.config.set({"codec_pipeline.path": "zarrs.ZarrsCodecPipeline"}):
+    with _configuring, zarr.config.set({"codec_pipeline.path": path, "array.write_empty_chunks": True}):
         yield
 
 
@@ -217,18 +220,32 @@ def _create(store: Path, path: str, **arguments: Any) -> zarr.Array[Any]:
 
 
 def open_array(store: Path, path: str, *, write: bool = False) -> zarr.Array[Any]:
-    """Open an array of a store.
+    """Open an array of a store to read it, or to write chunks that are not sharded.
 
     Raises
     ------
     StoreError
         If it is not there or its metadata cannot be read.
     """
+    return _open(store, path, _RUST, "r+" if write else "r")
+
+
+def open_sharded(store: Path, path: str) -> zarr.Array[Any]:
+    """Open an array of a store to write shards; errors as for `open_array`.
+
+    The Rust codecs put the chunks of a shard one after the other as their threads finish, so that the same
+    pixels give other bytes each time. Those of zarr-python keep an order, replace shards atomically, and cost
+    no more time.
+    """
+    return _open(store, path, _PYTHON, "r+")
+
+
+def _open(store: Path, path: str, pipeline: str, mode: Literal["r", "r+"]) -> zarr.Array[Any]:
     import zarr
 
     try:
-        with _pipeline():
-            return zarr.open_array(store, path=path, mode="r+" if write else "r", zarr_format=3)
+        with _pipeline(pipeline):
+            return zarr.open_array(store, path=path, mode=mode, zarr_format=3)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise StoreError(
             Problem(

@@ -1,0 +1,107 @@
+"""Stream a stack through a procedure: read ahead, compute, and write behind, all at the same time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impasto.procedure import Procedure
+from impasto.store import STACK_CHUNK, MapsWriter, Stack, Unit
+
+# A tile of the stack, all lights. With one tile read ahead, and one unit of maps on its way to the disk while
+# the next is filled, the whole process stays under 1 GB, whatever the size and number of the photographs. Not
+# an option, because the result must not depend on it.
+_TILE_BYTES = 64 << 20
+
+Tile = tuple[Unit, slice, slice]
+
+
+def fit_units(
+    stack: Stack,
+    procedure: Procedure,
+    writer: MapsWriter,
+    units: Sequence[Unit],
+    advance: Callable[[int], None],
+) -> None:
+    """Fit units and write them.
+
+    The calling thread computes (the core has its own threads), one thread reads the next tile, one writes the
+    last unit. Ctrl-C ends after the tile and the unit under way.
+
+    Parameters
+    ----------
+    stack : Stack
+    procedure : Procedure
+    writer : MapsWriter
+    units : sequence of Unit
+        Those that have to be fitted.
+    advance : callable
+        Called with the number of pixels just fitted.
+
+    Raises
+    ------
+    StoreError
+        If the stack is damaged or the disk is full.
+    """
+    height = _tile_rows(stack, procedure)
+    tiles = [(unit, *place) for unit in units for place in unit.tiles(height, STACK_CHUNK)]
+    with (
+        ThreadPoolExecutor(1, thread_name_prefix="read") as reader,
+        ThreadPoolExecutor(1, thread_name_prefix="write") as unit_writer,
+    ):
+        written: Future[None] | None = None
+        maps: dict[str, NDArray[Any]] = {}
+        for (unit, rows, columns), radiance in _read_ahead(stack, procedure, tiles, reader):
+            if not maps:
+                maps = {
+                    map.name: np.empty(map.shape(unit.height, unit.width), map.dtype) for map in writer.maps
+                }
+            fitted = procedure.fit(radiance, rows, columns)
+            inside = (_shifted(rows, unit.rows), _shifted(columns, unit.columns))
+            for name, values in maps.items():
+                target = values[inside]
+                target[...] = fitted[name].reshape(target.shape)
+            advance(radiance.shape[1] * radiance.shape[2])
+            if (rows.stop, columns.stop) == (unit.rows.stop, unit.columns.stop):
+                if written is not None:
+                    written.result()
+                written = unit_writer.submit(writer.write, unit, maps)
+                maps = {}
+        if written is not None:
+            written.result()
+
+
+def _tile_rows(stack: Stack, procedure: Procedure) -> int:
+    """Return how many rows of a chunk's width make a tile: the whole chunk, or less where lights are many."""
+    lights, _, _, channels = stack.shape
+    if procedure.lights is not None:
+        lights = len(procedure.lights)
+    row_bytes = lights * STACK_CHUNK * channels * stack.dtype.itemsize
+    rows = STACK_CHUNK
+    while rows > 32 and rows * row_bytes > _TILE_BYTES:
+        rows //= 2
+    return rows
+
+
+def _read_ahead(
+    stack: Stack, procedure: Procedure, tiles: Sequence[Tile], reader: ThreadPoolExecutor
+) -> Iterator[tuple[Tile, NDArray[Any]]]:
+    """Yield each tile with its stored values, while the next is being read."""
+    coming: Future[NDArray[Any]] | None = None
+    for number, tile in enumerate(tiles):
+        now = coming or reader.submit(stack.read, tile[1], tile[2], procedure.lights)
+        values = now.result()
+        del now
+        coming = None
+        if number + 1 < len(tiles):
+            _, rows, columns = tiles[number + 1]
+            coming = reader.submit(stack.read, rows, columns, procedure.lights)
+        yield tile, values
+
+
+def _shifted(pixels: slice, origin: slice) -> slice:
+    return slice(pixels.start - origin.start, pixels.stop - origin.start)
