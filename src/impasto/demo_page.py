@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -156,7 +157,7 @@ def write_page(summary: DemoSummary, truth: Path) -> None:
     page.table(
         ("step", "time"),
         [(name, seconds(duration)) for name, duration in summary.steps.items()],
-        caption=f"{platform.processor() or platform.machine()}",
+        caption=f"On {os.cpu_count()} processor cores, {platform.machine()}",
     )
     page.text(versions())
     page.write(summary.page)
