@@ -13,14 +13,14 @@ demo: $(VENV)/.built
 test: test-rust check test-python
 
 test-rust:
-	cargo test --release --locked --no-default-features --manifest-path core/Cargo.toml
+	cargo test --locked --no-default-features --manifest-path core/Cargo.toml
 
 test-python: $(VENV)/.built
 	$(BIN)/pytest
 
 check: $(VENV)/.built
 	cargo fmt --check --manifest-path core/Cargo.toml
-	cargo clippy --release --locked --no-default-features --all-targets --manifest-path core/Cargo.toml -- -D warnings
+	cargo clippy --locked --all-targets --manifest-path core/Cargo.toml -- -D warnings
 	$(BIN)/ruff check src tests benchmarks
 	$(BIN)/ruff format --check src tests benchmarks
 	$(BIN)/mypy

@@ -4,7 +4,7 @@
 //! are therefore an arrow: a block per channel, bordered by the lobes. Eliminating the blocks leaves a system of the size
 //! of the number of lobes.
 
-use crate::lanes::{Lane, LaneMask};
+use crate::lanes::{Lane, LaneMask, outlined};
 use crate::minimise::solve_symmetric;
 use crate::models::MAX_LOBES;
 use crate::number::{Mask, Number, Real, array};
@@ -40,15 +40,15 @@ impl<const FMA: bool, const C: usize> Magnitudes<FMA, C> {
 
 /// Which magnitudes are free; the others are held at 0.
 #[derive(Clone, Copy)]
-pub struct Free<const C: usize> {
-    pub diffuse: [LaneMask; C],
-    pub ambient: [LaneMask; C],
-    pub specular: [LaneMask; MAX_LOBES],
+struct Free<const C: usize> {
+    diffuse: [LaneMask; C],
+    ambient: [LaneMask; C],
+    specular: [LaneMask; MAX_LOBES],
 }
 
 impl<const C: usize> Free<C> {
     #[inline(always)]
-    pub fn new(lobes: usize, ambient: bool) -> Self {
+    fn new(lobes: usize, ambient: bool) -> Self {
         Free {
             diffuse: [LaneMask::ALL; C],
             ambient: [if ambient { LaneMask::ALL } else { LaneMask::NONE }; C],
@@ -138,7 +138,7 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
 
     /// Eliminates the channels' blocks.
     #[inline(always)]
-    pub fn factor<const AMBIENT: bool>(&self, lobes: usize, free: &Free<C>) -> Factored<'_, FMA, C> {
+    fn factor<const AMBIENT: bool>(&self, lobes: usize, free: &Free<C>) -> Factored<FMA, C> {
         let zero = Lane::splat(0.0);
         let one = Lane::splat(1.0);
         let mut inverse = [BlockInverse { diffuse: zero, cross: zero, ambient: zero }; C];
@@ -186,18 +186,27 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
                 schur[i][j] = Lane::select(free.specular[i] & free.specular[j], schur[i][j], zero);
             }
         }
-        Factored { arrow: self, lobes, inverse, schur }
+        Factored { channel: self.channel, lobes, inverse, schur }
     }
 
-    /// The magnitudes that fit best, none of them negative.
+    /// The magnitudes that fit best, none of them negative, and the factored equations of those that are not held at 0.
     #[inline(always)]
-    pub fn magnitudes<const AMBIENT: bool>(&self, lobes: usize, free: &mut Free<C>) -> Magnitudes<FMA, C> {
+    pub fn magnitudes<const AMBIENT: bool>(&self, lobes: usize) -> (Magnitudes<FMA, C>, Factored<FMA, C>) {
+        outlined::<FMA, _>(
+            #[inline(always)]
+            || self.nonnegative::<AMBIENT>(lobes),
+        )
+    }
+
+    #[inline(always)]
+    fn nonnegative<const AMBIENT: bool>(&self, lobes: usize) -> (Magnitudes<FMA, C>, Factored<FMA, C>) {
         let zero = Lane::splat(0.0);
-        let mut best;
+        let mut free = Free::new(lobes, AMBIENT);
         // Holding every negative magnitude at 0 at once is not quite the constrained optimum where two of them are negative
         // only together; the next step of the fit begins from here again and mends it.
-        loop {
-            best = self.factor::<AMBIENT>(lobes, free).solve::<AMBIENT>(&self.right);
+        let (mut best, factored) = loop {
+            let factored = self.factor::<AMBIENT>(lobes, &free);
+            let best = factored.solve_inline::<AMBIENT>(&self.right);
             let mut violated = LaneMask::NONE;
             for j in 0..lobes {
                 let negative = best.specular[j].lt(zero) & free.specular[j];
@@ -216,9 +225,9 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
             }
             // Each round holds one more magnitude at least, so this ends.
             if !violated.any() {
-                break;
+                break (best, factored);
             }
-        }
+        };
         for k in 0..C {
             best.diffuse[k] = best.diffuse[k].max(zero);
             best.ambient[k] = best.ambient[k].max(zero);
@@ -226,7 +235,7 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
         for j in 0..lobes {
             best.specular[j] = best.specular[j].max(zero);
         }
-        best
+        (best, factored)
     }
 }
 
@@ -250,16 +259,25 @@ impl<const FMA: bool> BlockInverse<FMA> {
 }
 
 /// The normal equations, ready to be solved for any right-hand side.
-pub struct Factored<'a, const FMA: bool, const C: usize> {
-    arrow: &'a Arrow<FMA, C>,
+#[derive(Clone, Copy)]
+pub struct Factored<const FMA: bool, const C: usize> {
+    channel: [ChannelSums<FMA>; C],
     lobes: usize,
     inverse: [BlockInverse<FMA>; C],
     schur: [[Lane<FMA>; MAX_LOBES]; MAX_LOBES],
 }
 
-impl<const FMA: bool, const C: usize> Factored<'_, FMA, C> {
+impl<const FMA: bool, const C: usize> Factored<FMA, C> {
     #[inline(always)]
     pub fn solve<const AMBIENT: bool>(&self, right: &Magnitudes<FMA, C>) -> Magnitudes<FMA, C> {
+        outlined::<FMA, _>(
+            #[inline(always)]
+            || self.solve_inline::<AMBIENT>(right),
+        )
+    }
+
+    #[inline(always)]
+    fn solve_inline<const AMBIENT: bool>(&self, right: &Magnitudes<FMA, C>) -> Magnitudes<FMA, C> {
         let mut result = *right;
         for k in 0..C {
             (result.diffuse[k], result.ambient[k]) =
@@ -270,7 +288,7 @@ impl<const FMA: bool, const C: usize> Factored<'_, FMA, C> {
         }
         for j in 0..self.lobes {
             for k in 0..C {
-                let sums = &self.arrow.channel[k];
+                let sums = &self.channel[k];
                 result.specular[j] = result.specular[j] - sums.diffuse_specular[j] * result.diffuse[k];
                 if AMBIENT {
                     result.specular[j] = result.specular[j] - sums.one_specular[j] * result.ambient[k];
@@ -279,7 +297,7 @@ impl<const FMA: bool, const C: usize> Factored<'_, FMA, C> {
         }
         result.specular = solve_symmetric(self.schur, result.specular);
         for k in 0..C {
-            let sums = &self.arrow.channel[k];
+            let sums = &self.channel[k];
             let mut diffuse = right.diffuse[k];
             let mut ambient = right.ambient[k];
             for j in 0..self.lobes {

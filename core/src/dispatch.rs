@@ -7,7 +7,8 @@ use crate::joint::{JointFit, Options};
 use crate::lanes::LANES;
 use crate::models::{Model, Optics, ShapeParameter};
 use crate::observations::Stack;
-use crate::record::Layout;
+use crate::paper::{PaperFit, Sample};
+use crate::record::{FitGroup, Layout};
 use crate::render::{Parameters, View, render_group};
 use rayon::prelude::*;
 
@@ -41,13 +42,8 @@ pub fn fast_instructions() -> bool {
 }
 
 #[inline(always)]
-fn fit_block<M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool>(
-    fit: &mut JointFit<M, FMA, C, P, AMBIENT>,
-    block: usize,
-    rows: &mut [f32],
-    status: &mut [u8],
-) {
-    let width = JointFit::<M, FMA, C, P, AMBIENT>::LAYOUT.width();
+fn fit_block<F: FitGroup>(fit: &mut F, block: usize, rows: &mut [f32], status: &mut [u8]) {
+    let width = fit.layout().width();
     for (group, (rows, status)) in rows.chunks_mut(LANES * width).zip(status.chunks_mut(LANES)).enumerate() {
         fit.fit_group(block * BLOCK + group * LANES, rows, status);
     }
@@ -55,45 +51,66 @@ fn fit_block<M: Model, const FMA: bool, const C: usize, const P: usize, const AM
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn fit_block_fast<M: Model, const C: usize, const P: usize, const AMBIENT: bool>(
-    fit: &mut JointFit<M, true, C, P, AMBIENT>,
-    block: usize,
-    rows: &mut [f32],
-    status: &mut [u8],
-) {
+fn fit_block_fast<F: FitGroup>(fit: &mut F, block: usize, rows: &mut [f32], status: &mut [u8]) {
     fit_block(fit, block, rows, status);
 }
 
-fn fit_tile<M: Model, const C: usize, const P: usize, const AMBIENT: bool>(
+/// Fits a tile with all threads: `fast` makes the fit for AVX2 and FMA, `plain` the one for any processor.
+fn fit_tile<Fast: FitGroup, Plain: FitGroup>(
+    pixels: usize,
+    layout: Layout,
+    fast: impl Fn() -> Fast + Sync + Send,
+    plain: impl Fn() -> Plain + Sync + Send,
+) -> Fitted {
+    let width = layout.width();
+    let mut rows = vec![0.0; pixels * width];
+    let mut status = vec![0; pixels];
+    let blocks = rows.par_chunks_mut(BLOCK * width).zip(status.par_chunks_mut(BLOCK)).enumerate();
+    if fast_instructions() {
+        blocks.for_each_init(fast, |fit, (block, (rows, status))| {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: the processor has AVX2 and FMA, as `fast_instructions` has just said.
+            unsafe {
+                fit_block_fast(fit, block, rows, status);
+            }
+            #[cfg(not(target_arch = "x86_64"))]
+            fit_block(fit, block, rows, status);
+        });
+    } else {
+        blocks.for_each_init(plain, |fit, (block, (rows, status))| fit_block(fit, block, rows, status));
+    }
+    Fitted { layout, rows, status }
+}
+
+fn fit_joint<M: Model, const C: usize, const P: usize, const AMBIENT: bool>(
     stack: &Stack,
     colour: &[f64],
     options: Options,
-) -> Fitted {
-    let layout = JointFit::<M, false, C, P, AMBIENT>::LAYOUT;
-    let width = layout.width();
-    let mut rows = vec![0.0; stack.pixels * width];
-    let mut status = vec![0; stack.pixels];
-    let blocks = rows.par_chunks_mut(BLOCK * width).zip(status.par_chunks_mut(BLOCK)).enumerate();
-    if fast_instructions() {
-        blocks.for_each_init(
-            || JointFit::<M, true, C, P, AMBIENT>::new(stack, colour, options),
-            |fit, (block, (rows, status))| {
-                #[cfg(target_arch = "x86_64")]
-                // SAFETY: the processor has AVX2 and FMA, as `fast_instructions` has just said.
-                unsafe {
-                    fit_block_fast(fit, block, rows, status);
-                }
-                #[cfg(not(target_arch = "x86_64"))]
-                fit_block(fit, block, rows, status);
-            },
-        );
-    } else {
-        blocks.for_each_init(
-            || JointFit::<M, false, C, P, AMBIENT>::new(stack, colour, options),
-            |fit, (block, (rows, status))| fit_block(fit, block, rows, status),
-        );
+) -> Option<Fitted> {
+    Some(fit_tile(
+        stack.pixels,
+        JointFit::<M, true, C, P, AMBIENT>::LAYOUT,
+        || JointFit::<M, true, C, P, AMBIENT>::new(stack, colour, options),
+        || JointFit::<M, false, C, P, AMBIENT>::new(stack, colour, options),
+    ))
+}
+
+fn fit_paper<M: Model, const C: usize>(
+    ambient: bool,
+    stack: &Stack,
+    colour: &[f64],
+    sample: Sample,
+    options: Options,
+) -> Option<Fitted> {
+    if !PaperFit::<M, true, C>::APPLIES {
+        return None;
     }
-    Fitted { layout, rows, status }
+    Some(fit_tile(
+        stack.pixels,
+        PaperFit::<M, true, C>::LAYOUT,
+        || PaperFit::<M, true, C>::new(stack, colour, sample, ambient, options),
+        || PaperFit::<M, false, C>::new(stack, colour, sample, ambient, options),
+    ))
 }
 
 #[inline(always)]
@@ -156,10 +173,28 @@ macro_rules! dispatch {
         pub fn fit(name: &str, ambient: bool, stack: &Stack, colour: &[f64], options: Options) -> Option<Fitted> {
             match (name, colour.len(), ambient) {
                 $(
-                    ($name, 1, false) => Some(fit_tile::<$model, 1, { 2 + <$model>::SHAPE.len() }, false>(stack, colour, options)),
-                    ($name, 1, true) => Some(fit_tile::<$model, 1, { 2 + <$model>::SHAPE.len() }, true>(stack, colour, options)),
-                    ($name, 3, false) => Some(fit_tile::<$model, 3, { 2 + <$model>::SHAPE.len() }, false>(stack, colour, options)),
-                    ($name, 3, true) => Some(fit_tile::<$model, 3, { 2 + <$model>::SHAPE.len() }, true>(stack, colour, options)),
+                    ($name, 1, false) => fit_joint::<$model, 1, { 2 + <$model>::SHAPE.len() }, false>(stack, colour, options),
+                    ($name, 1, true) => fit_joint::<$model, 1, { 2 + <$model>::SHAPE.len() }, true>(stack, colour, options),
+                    ($name, 3, false) => fit_joint::<$model, 3, { 2 + <$model>::SHAPE.len() }, false>(stack, colour, options),
+                    ($name, 3, true) => fit_joint::<$model, 3, { 2 + <$model>::SHAPE.len() }, true>(stack, colour, options),
+                )*
+                _ => None,
+            }
+        }
+
+        /// Fits a tile by the paper's procedure; `None` also where that is not defined for the model.
+        pub fn paper(
+            name: &str,
+            ambient: bool,
+            stack: &Stack,
+            colour: &[f64],
+            sample: Sample,
+            options: Options,
+        ) -> Option<Fitted> {
+            match (name, colour.len()) {
+                $(
+                    ($name, 1) => fit_paper::<$model, 1>(ambient, stack, colour, sample, options),
+                    ($name, 3) => fit_paper::<$model, 3>(ambient, stack, colour, sample, options),
                 )*
                 _ => None,
             }

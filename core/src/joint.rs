@@ -1,14 +1,12 @@
 //! The joint fit: normal, shape and magnitudes of a pixel over all its lights at once.
 
-use crate::dual::Dual;
-use crate::geometry::Illumination;
 use crate::lanes::Lane;
 use crate::minimise::{inverse, minimise};
-use crate::models::{Basis, MAX_LOBES, MAX_SHAPE, Model, Optics};
+use crate::models::{MAX_LOBES, MAX_SHAPE, Model, Optics};
 use crate::number::{Number, Real, array};
-use crate::observations::{Group, Observation, Stack};
-use crate::record::{Layout, Row, Status};
-use crate::separable::{Loss, Point, Separable, Solution};
+use crate::observations::{Group, Stack};
+use crate::record::{FitGroup, Layout, Row, Status};
+use crate::separable::{Loss, Point, Scratch, Separable, Solution};
 use crate::start::{Grey, grey, start};
 use std::marker::PhantomData;
 
@@ -30,27 +28,10 @@ pub struct JointFit<'a, M, const FMA: bool, const C: usize, const P: usize, cons
     model: PhantomData<M>,
 }
 
-/// Buffers with one entry per light, handed from group to group.
-pub struct Scratch<const FMA: bool, const C: usize, const P: usize> {
-    robust: Vec<[Lane<FMA>; C]>,
-    basis: Vec<Basis<Dual<Lane<FMA>, P>>>,
-}
-
-impl<const FMA: bool, const C: usize, const P: usize> Scratch<FMA, C, P> {
-    pub fn new(lights: usize) -> Self {
-        let zero = Dual::constant(Lane::splat(0.0));
-        Scratch {
-            robust: vec![[Lane::splat(1.0); C]; lights],
-            basis: vec![Basis { diffuse: zero, specular: [zero; MAX_LOBES] }; lights],
-        }
-    }
-}
-
 impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool>
     JointFit<'a, M, FMA, C, P, AMBIENT>
 {
-    pub const LAYOUT: Layout =
-        Layout { channels: C, lobes: M::LOBES, shape: P - 2, ambient: if AMBIENT { C } else { 0 } };
+    pub const LAYOUT: Layout = Layout::joint(C, M::LOBES, P - 2, if AMBIENT { C } else { 0 });
 
     /// Unknowns that each channel's samples must determine.
     const UNKNOWNS: usize = P + 1 + M::LOBES + AMBIENT as usize;
@@ -67,20 +48,27 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIEN
             model: PhantomData,
         }
     }
+}
 
-    /// Fits the eight pixels from `first` on and writes those that the tile has.
+impl<M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool> FitGroup
+    for JointFit<'_, M, FMA, C, P, AMBIENT>
+{
+    fn layout(&self) -> Layout {
+        Self::LAYOUT
+    }
+
     #[inline(always)]
-    pub fn fit_group(&mut self, first: usize, rows: &mut [f32], status: &mut [u8]) {
+    fn fit_group(&mut self, first: usize, rows: &mut [f32], status: &mut [u8]) {
         self.group.gather(self.stack, first);
         grey(&self.group.observations, &mut self.grey);
         let wanted = !self.group.usable_lights.lt(Lane::splat(Self::UNKNOWNS as f64));
         let begin = start::<M, FMA, AMBIENT>(&self.grey, &self.group.illuminations, &self.options.optics);
 
-        let mut problem = separable::<M, FMA, C, P, AMBIENT>(
-            &self.group.observations,
-            &self.group.illuminations,
+        let mut problem = Separable::<M, FMA, C, P, AMBIENT>::new(
+            &self.group,
             self.colour,
-            &self.options,
+            self.options.optics,
+            self.options.loss,
             &mut self.scratch,
         );
         let outcome = minimise(&mut problem, &begin, wanted, self.options.max_steps);
@@ -88,7 +76,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIEN
         let summary = summarise(&problem, &solution);
         let at_bound = problem.at_bound(&outcome.point, &solution.magnitudes);
         let deviations = Deviations::new::<P, AMBIENT>(M::LOBES, &solution, summary.chi2_reduced);
-        (self.scratch.robust, self.scratch.basis) = (problem.robust, problem.basis);
+        problem.give_back(&mut self.scratch);
 
         let width = Self::LAYOUT.width();
         for (lane, status) in status.iter_mut().enumerate() {
@@ -110,34 +98,16 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIEN
                 row.fill(f32::NAN);
                 continue;
             }
-            write_row::<FMA, C, P>(Row::new(row), Self::LAYOUT, lane, &outcome.point, &solution, &summary, &deviations);
+            write_row::<FMA, C, P>(
+                Row::new(row),
+                [M::LOBES, P - 2, if AMBIENT { C } else { 0 }],
+                lane,
+                &outcome.point,
+                &solution,
+                &summary,
+                &deviations,
+            );
         }
-    }
-}
-
-/// The problem of one group over borrowed buffers, which the caller takes back from it.
-#[inline(always)]
-pub fn separable<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool>(
-    observations: &'a [Observation<FMA, C>],
-    illuminations: &'a [Illumination<Lane<FMA>>],
-    colour: [Lane<FMA>; C],
-    options: &Options,
-    scratch: &mut Scratch<FMA, C, P>,
-) -> Separable<'a, M, FMA, C, P, AMBIENT> {
-    let mut robust = std::mem::take(&mut scratch.robust);
-    if options.loss != Loss::Linear {
-        robust.fill([Lane::splat(1.0); C]);
-    }
-    Separable {
-        observations,
-        illuminations,
-        colour,
-        optics: options.optics,
-        loss: options.loss,
-        fixed_specular: None,
-        robust,
-        basis: std::mem::take(&mut scratch.basis),
-        model: PhantomData,
     }
 }
 
@@ -233,7 +203,7 @@ impl<const FMA: bool, const C: usize> Deviations<FMA, C> {
 #[inline(always)]
 fn write_row<const FMA: bool, const C: usize, const P: usize>(
     mut row: Row,
-    layout: Layout,
+    [lobes, shapes, ambient]: [usize; 3],
     lane: usize,
     point: &Point<FMA>,
     solution: &Solution<FMA, C, P>,
@@ -244,14 +214,14 @@ fn write_row<const FMA: bool, const C: usize, const P: usize>(
     let shape: [f32; MAX_SHAPE] = array!(|i| point.shape_log[i].0[lane].exp());
     row.extend(point.normal.iter().map(|x| x.0[lane]));
     row.extend(magnitudes.diffuse.iter().map(|x| x.0[lane]));
-    row.extend(magnitudes.specular[..layout.lobes].iter().map(|x| x.0[lane]));
-    row.extend(shape[..layout.shape].iter().copied());
-    row.extend(magnitudes.ambient[..layout.ambient].iter().map(|x| x.0[lane]));
+    row.extend(magnitudes.specular[..lobes].iter().map(|x| x.0[lane]));
+    row.extend(shape[..shapes].iter().copied());
+    row.extend(magnitudes.ambient[..ambient].iter().map(|x| x.0[lane]));
     row.push(summary.chi2_reduced.0[lane]);
     row.push(summary.residual_rms.0[lane]);
     row.push(deviations.normal.0[lane]);
     row.extend(deviations.diffuse.iter().map(|x| x.0[lane]));
-    row.extend(deviations.specular[..layout.lobes].iter().map(|x| x.0[lane]));
-    row.extend((0..layout.shape).map(|i| shape[i] * deviations.shape_relative[i].0[lane]));
-    row.extend(deviations.ambient[..layout.ambient].iter().map(|x| x.0[lane]));
+    row.extend(deviations.specular[..lobes].iter().map(|x| x.0[lane]));
+    row.extend((0..shapes).map(|i| shape[i] * deviations.shape_relative[i].0[lane]));
+    row.extend(deviations.ambient[..ambient].iter().map(|x| x.0[lane]));
 }

@@ -200,7 +200,7 @@ impl LaneMask {
     pub const ALL: Self = LaneMask([u32::MAX; LANES]);
     pub const NONE: Self = LaneMask([0; LANES]);
 
-    #[inline(always)]
+    #[cfg(test)]
     pub fn new(holds: impl Fn(usize) -> bool) -> Self {
         let mut mask = [0; LANES];
         for (i, lane) in mask.iter_mut().enumerate() {

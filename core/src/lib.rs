@@ -13,6 +13,9 @@ mod minimise;
 pub mod models;
 mod number;
 mod observations;
+mod paper;
+mod paper_shape;
+#[cfg(feature = "python")]
 mod python;
 mod record;
 mod render;

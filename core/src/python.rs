@@ -5,6 +5,7 @@ use crate::geometry::{Illumination, Place};
 use crate::joint::Options;
 use crate::models::{FresnelAngle, Optics};
 use crate::observations::{Noise, Samples, Stack};
+use crate::paper::Sample;
 use crate::record::Layout;
 use crate::render::{Parameters, View};
 use crate::separable::Loss;
@@ -104,11 +105,12 @@ fn fast_instructions() -> bool {
     dispatch::fast_instructions()
 }
 
-/// Fits a model to every pixel of a tile; see `impasto.fit`.
+/// Fits a model to every pixel of a tile; see `impasto.fit`. `paper` is (threshold in radians, As of the sample, refined)
+/// for the paper's procedure; an As of NaN stops after its diffuse stage.
 #[pyfunction]
 #[pyo3(signature = (model, radiance, *, scale, offset, light_direction, light_position_mm, light_intensity,
     view_direction, camera_distance_mm, position_mm, light_rgb, clip_level, shadow_level, sample_mask, noise, index,
-    fresnel, loss, loss_scale, max_steps))]
+    fresnel, loss, loss_scale, max_steps, paper=None))]
 #[allow(clippy::too_many_arguments)]
 fn fit<'py>(
     py: Python<'py>,
@@ -132,6 +134,7 @@ fn fit<'py>(
     loss: &str,
     loss_scale: f32,
     max_steps: usize,
+    paper: Option<(f64, f64, bool)>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (name, ambient) = parse_model(model)?;
     let options = Options { optics: parse_optics(index, fresnel)?, loss: parse_loss(loss, loss_scale)?, max_steps };
@@ -179,8 +182,14 @@ fn fit<'py>(
         return Err(invalid("radiance has no pixels"));
     }
     let fitted = py
-        .detach(|| dispatch::fit(name, ambient, &stack, &light_rgb, options))
-        .expect("name and channels were checked");
+        .detach(|| match paper {
+            None => dispatch::fit(name, ambient, &stack, &light_rgb, options),
+            Some((threshold, specular, refined)) => {
+                let sample = Sample { threshold, specular, refined };
+                dispatch::paper(name, ambient, &stack, &light_rgb, sample, options)
+            }
+        })
+        .ok_or_else(|| invalid(format!("the paper's procedure is not defined for {model}")))?;
     into_dict(py, fitted.layout, fitted.rows, fitted.status)
 }
 
@@ -191,8 +200,8 @@ fn into_dict(py: Python<'_>, layout: Layout, rows: Vec<f32>, status: Vec<u8>) ->
     let dict = PyDict::new(py);
     let all = PySlice::full(py);
     let mut first = 0;
-    for (name, width) in layout.columns() {
-        let scalar = matches!(name, "chi2_reduced" | "residual_rms" | "normal_sd");
+    for (name, width) in layout.columns {
+        let scalar = matches!(name, "chi2_reduced" | "residual_rms" | "normal_sd" | "view_tilt");
         if scalar {
             dict.set_item(name, rows.get_item((&all, first))?)?;
         } else if width > 0 {

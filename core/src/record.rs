@@ -12,41 +12,75 @@ pub enum Status {
     NotIdentified = 5,
 }
 
-/// Where each quantity stands in a row, as (first column, number of columns).
+const MAX_COLUMNS: usize = 12;
+const UNUSED: (&str, usize) = ("", 0);
+
+/// What a fit writes for a pixel: the name and the number of columns of each quantity, in order.
 #[derive(Clone, Copy, Debug)]
 pub struct Layout {
-    pub channels: usize,
-    pub lobes: usize,
-    pub shape: usize,
-    /// Number of ambient magnitudes: the channels, or 0.
-    pub ambient: usize,
+    pub columns: [(&'static str, usize); MAX_COLUMNS],
 }
 
 impl Layout {
-    /// Name and width of each quantity, in the order of the row.
-    pub fn columns(&self) -> [(&'static str, usize); 12] {
-        [
-            ("normal", 3),
-            ("diffuse", self.channels),
-            ("specular", self.lobes),
-            ("shape", self.shape),
-            ("ambient", self.ambient),
-            ("chi2_reduced", 1),
-            ("residual_rms", 1),
-            ("normal_sd", 1),
-            ("diffuse_sd", self.channels),
-            ("specular_sd", self.lobes),
-            ("shape_sd", self.shape),
-            ("ambient_sd", self.ambient),
-        ]
+    /// A joint fit's row; `ambient` is the number of ambient magnitudes.
+    pub const fn joint(channels: usize, lobes: usize, shape: usize, ambient: usize) -> Self {
+        Layout {
+            columns: [
+                ("normal", 3),
+                ("diffuse", channels),
+                ("specular", lobes),
+                ("shape", shape),
+                ("ambient", ambient),
+                ("chi2_reduced", 1),
+                ("residual_rms", 1),
+                ("normal_sd", 1),
+                ("diffuse_sd", channels),
+                ("specular_sd", lobes),
+                ("shape_sd", shape),
+                ("ambient_sd", ambient),
+            ],
+        }
     }
 
-    pub fn width(&self) -> usize {
-        self.columns().iter().map(|(_, width)| width).sum()
+    /// The row of the paper's procedure, whose unweighted residuals give no uncertainties.
+    pub const fn paper(channels: usize) -> Self {
+        Layout {
+            columns: [
+                ("normal", 3),
+                ("diffuse", channels),
+                ("specular", 1),
+                ("shape", 1),
+                ("ambient", channels),
+                ("residual_rms", 1),
+                ("view_tilt", 1),
+                UNUSED,
+                UNUSED,
+                UNUSED,
+                UNUSED,
+                UNUSED,
+            ],
+        }
+    }
+
+    pub const fn width(&self) -> usize {
+        let mut width = 0;
+        let mut i = 0;
+        while i < self.columns.len() {
+            width += self.columns[i].1;
+            i += 1;
+        }
+        width
     }
 }
 
-/// Appends quantities to a pixel's row in the order of [`Layout::columns`].
+/// A fit of eight pixels at a time.
+pub trait FitGroup {
+    fn layout(&self) -> Layout;
+    /// Fits the eight pixels from `first` on and writes those that the tile has: `status` says how many.
+    fn fit_group(&mut self, first: usize, rows: &mut [f32], status: &mut [u8]);
+}
+
+/// Appends quantities to a pixel's row in the order of its layout.
 pub struct Row<'a> {
     rest: &'a mut [f32],
 }

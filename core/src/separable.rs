@@ -4,14 +4,14 @@
 //! 1973, with Kaufman's simplification of the Jacobian, 1975) eliminates the magnitudes at every step: what remains has two
 //! parameters for the normal and one for each shape parameter.
 
-use crate::arrow::{Arrow, Free, Magnitudes};
+use crate::arrow::{Arrow, Factored, Magnitudes};
 use crate::dual::Dual;
 use crate::geometry::{Illumination, normalise, tangents};
 use crate::lanes::{Lane, LaneMask, outlined};
 use crate::minimise::{Objective, Quadratic};
 use crate::models::{Basis, MAX_LOBES, MAX_SHAPE, Model, Optics};
 use crate::number::{Mask, Number, Real, array};
-use crate::observations::Observation;
+use crate::observations::{Group, Observation};
 use std::marker::PhantomData;
 
 /// Normals may tilt up to 84° from the painting's normal: beyond that no camera in front sees the element.
@@ -43,23 +43,38 @@ pub struct Point<const FMA: bool> {
 pub struct Separable<'a, M, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool> {
     pub observations: &'a [Observation<FMA, C>],
     pub illuminations: &'a [Illumination<Lane<FMA>>],
-    pub colour: [Lane<FMA>; C],
-    pub optics: Optics,
-    pub loss: Loss,
+    colour: [Lane<FMA>; C],
+    optics: Optics,
+    loss: Loss,
     /// Specular magnitude where it is known beforehand, as one value for a whole sample.
     pub fixed_specular: Option<[Lane<FMA>; MAX_LOBES]>,
     /// Factor of each sample's weight from the robust loss, refreshed at every accepted point.
-    pub robust: Vec<[Lane<FMA>; C]>,
-    pub basis: Vec<Basis<Dual<Lane<FMA>, P>>>,
-    pub model: PhantomData<M>,
+    robust: Vec<[Lane<FMA>; C]>,
+    basis: Vec<Basis<Dual<Lane<FMA>, P>>>,
+    model: PhantomData<M>,
+}
+
+/// Buffers with one entry per light, handed from group to group.
+pub struct Scratch<const FMA: bool, const C: usize, const P: usize> {
+    robust: Vec<[Lane<FMA>; C]>,
+    basis: Vec<Basis<Dual<Lane<FMA>, P>>>,
+}
+
+impl<const FMA: bool, const C: usize, const P: usize> Scratch<FMA, C, P> {
+    pub fn new(lights: usize) -> Self {
+        let zero = Dual::constant(Lane::splat(0.0));
+        Scratch {
+            robust: vec![[Lane::splat(1.0); C]; lights],
+            basis: vec![Basis { diffuse: zero, specular: [zero; MAX_LOBES] }; lights],
+        }
+    }
 }
 
 /// A point's magnitudes and everything that uncertainties are made from.
 pub struct Solution<const FMA: bool, const C: usize, const P: usize> {
     pub quadratic: Quadratic<FMA, P>,
     pub magnitudes: Magnitudes<FMA, C>,
-    pub arrow: Arrow<FMA, C>,
-    pub free: Free<C>,
+    pub factored: Factored<FMA, C>,
     /// For each nonlinear parameter, how the magnitudes follow it: −∂(magnitudes)/∂(parameter).
     pub following: [Magnitudes<FMA, C>; P],
 }
@@ -85,34 +100,65 @@ impl<const FMA: bool, const C: usize, const P: usize> Solution<FMA, C, P> {
         lobes: usize,
         covariance: &[[Lane<FMA>; P]; P],
     ) -> Magnitudes<FMA, C> {
-        let factored = self.arrow.factor::<AMBIENT>(lobes, &self.free);
         let one = Lane::splat(1.0);
         let mut variances = Magnitudes::zero();
         for k in 0..C {
             let mut unit = Magnitudes::zero();
             unit.diffuse[k] = one;
-            variances.diffuse[k] = factored.solve::<AMBIENT>(&unit).diffuse[k]
+            variances.diffuse[k] = self.factored.solve::<AMBIENT>(&unit).diffuse[k]
                 + propagated(array!(|p| self.following[p].diffuse[k]), covariance);
             if AMBIENT {
                 let mut unit = Magnitudes::zero();
                 unit.ambient[k] = one;
-                variances.ambient[k] = factored.solve::<AMBIENT>(&unit).ambient[k]
+                variances.ambient[k] = self.factored.solve::<AMBIENT>(&unit).ambient[k]
                     + propagated(array!(|p| self.following[p].ambient[k]), covariance);
             }
         }
         for j in 0..lobes {
             let mut unit = Magnitudes::zero();
             unit.specular[j] = one;
-            variances.specular[j] = factored.solve::<AMBIENT>(&unit).specular[j]
+            variances.specular[j] = self.factored.solve::<AMBIENT>(&unit).specular[j]
                 + propagated(array!(|p| self.following[p].specular[j]), covariance);
         }
         variances
     }
 }
 
-impl<M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool>
-    Separable<'_, M, FMA, C, P, AMBIENT>
+impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool>
+    Separable<'a, M, FMA, C, P, AMBIENT>
 {
+    /// The problem of one group, with buffers that `give_back` returns.
+    #[inline(always)]
+    pub fn new(
+        group: &'a Group<FMA, C>,
+        colour: [Lane<FMA>; C],
+        optics: Optics,
+        loss: Loss,
+        scratch: &mut Scratch<FMA, C, P>,
+    ) -> Self {
+        let mut robust = std::mem::take(&mut scratch.robust);
+        if loss != Loss::Linear {
+            robust.fill([Lane::splat(1.0); C]);
+        }
+        Separable {
+            observations: &group.observations,
+            illuminations: &group.illuminations,
+            colour,
+            optics,
+            loss,
+            fixed_specular: None,
+            robust,
+            basis: std::mem::take(&mut scratch.basis),
+            model: PhantomData,
+        }
+    }
+
+    /// Returns the buffers for the next group.
+    #[inline(always)]
+    pub fn give_back(self, scratch: &mut Scratch<FMA, C, P>) {
+        (scratch.robust, scratch.basis) = (self.robust, self.basis);
+    }
+
     #[inline(always)]
     fn free_lobes(&self) -> usize {
         if self.fixed_specular.is_some() { 0 } else { M::LOBES }
@@ -185,8 +231,7 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: b
             let specular = array!(|j| basis.specular[j].value);
             arrow.add::<AMBIENT>(lobes, basis.diffuse.value, &specular, &radiance, &self.weight(light), &self.colour);
         }
-        let mut free = Free::new(lobes, AMBIENT);
-        let mut magnitudes = arrow.magnitudes::<AMBIENT>(lobes, &mut free);
+        let (mut magnitudes, factored) = arrow.magnitudes::<AMBIENT>(lobes);
         if let Some(fixed) = self.fixed_specular {
             magnitudes.specular = fixed;
         }
@@ -244,11 +289,8 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: b
 
         // What the magnitudes can absorb of a step is taken out of the Hessian.
         let mut following = [Magnitudes::zero(); P];
-        {
-            let factored = arrow.factor::<AMBIENT>(lobes, &free);
-            for p in 0..P {
-                following[p] = factored.solve::<AMBIENT>(&projection[p]);
-            }
+        for p in 0..P {
+            following[p] = factored.solve::<AMBIENT>(&projection[p]);
         }
         for p in 0..P {
             // Rounding may leave less than nothing of a parameter that the magnitudes absorb whole.
@@ -258,7 +300,7 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: b
             }
             quadratic.hessian[p][p] = quadratic.hessian[p][p].max(floor);
         }
-        Solution { quadratic, magnitudes, arrow, free, following }
+        Solution { quadratic, magnitudes, factored, following }
     }
 
     /// ρ of a residual; `weight` includes the robust factor, `plain` does not.

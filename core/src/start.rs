@@ -1,6 +1,6 @@
 //! Where the fit of a pixel begins: a few plausible normals, each with a grid of shapes, the best by residual.
 
-use crate::arrow::{Arrow, Free};
+use crate::arrow::Arrow;
 use crate::geometry::{Illumination, chord_squared, dot, normalise};
 use crate::lanes::{Lane, outlined};
 use crate::minimise::solve_symmetric;
@@ -12,8 +12,8 @@ use crate::separable::{NORMAL_Z_MIN, Point};
 /// Mean over the channels of one light's samples, and the weight of that mean.
 #[derive(Clone, Copy)]
 pub struct Grey<const FMA: bool> {
-    radiance: Lane<FMA>,
-    weight: Lane<FMA>,
+    pub radiance: Lane<FMA>,
+    pub weight: Lane<FMA>,
 }
 
 #[inline(always)]
@@ -61,7 +61,7 @@ fn highlight_normal<const FMA: bool>(grey: &[Grey<FMA>], illuminations: &[Illumi
 /// Lambert's normal by linear least squares over samples away from the highlight that `previous` would have, in Cauchy's
 /// norm, so that shadows and what is left of the highlight do not pull.
 #[inline(always)]
-fn diffuse_normal<const FMA: bool>(
+pub fn diffuse_normal<const FMA: bool>(
     grey: &[Grey<FMA>],
     illuminations: &[Illumination<Lane<FMA>>],
     rounds: usize,
@@ -140,8 +140,7 @@ fn start_inline<M: Model, const FMA: bool, const AMBIENT: bool>(
             data = (sample.weight * sample.radiance).mul_add(sample.radiance, data);
         }
         for (arrow, shape) in arrows.iter().zip(M::STARTS) {
-            let mut free = Free::new(M::LOBES, AMBIENT);
-            let magnitudes = arrow.magnitudes::<AMBIENT>(M::LOBES, &mut free);
+            let (magnitudes, _) = arrow.magnitudes::<AMBIENT>(M::LOBES);
             let cost = data - magnitudes.dot(&arrow.right);
             let better = cost.lt(best_cost);
             best_cost = Lane::select(better, cost, best_cost);

@@ -1,0 +1,304 @@
+//! The paper's procedure (its Fig. 3): diffuse term first, from lights far from the highlight; then, with one specular
+//! magnitude for the whole sample, the shape of the lobe.
+//!
+//! Residuals are unweighted. In its literal form the shape is fitted with the view's tilt θv, ln(shape) and an empirical φn
+//! free, φv = 0 and the diffuse term held. In its refined form the view is the calibrated one, and Ad, θn, φn and the shape
+//! are fitted over all lights with As held.
+
+use crate::geometry::{Illumination, dot, normalise};
+use crate::joint::Options;
+use crate::lanes::{Lane, LaneMask};
+use crate::minimise::{Objective, Outcome, minimise};
+use crate::models::{Basis, Lambert, MAX_SHAPE, Model, Optics, ShapeParameter};
+use crate::number::{Number, Real, array};
+use crate::observations::{Group, Stack};
+use crate::paper_shape::{ShapeFit, Tilts};
+use crate::record::{FitGroup, Layout, Row, Status};
+use crate::separable::{Loss, Point, Scratch, Separable};
+use crate::start::{Grey, diffuse_normal, grey};
+use std::marker::PhantomData;
+
+/// What holds for the whole sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample {
+    /// Lights at least this far from the pixel's brightest, in radians, are taken to carry no specular term.
+    pub threshold: f64,
+    /// As, from the pixel that holds the highlight's peak.
+    pub specular: f64,
+    pub refined: bool,
+}
+
+/// The diffuse stage of Phong's form, Y = Ae + Ad max(0, n·l), with one Ae for all channels: as a basis function of
+/// value 1 it stands where a lobe would.
+struct UniformAmbient;
+
+impl Model for UniformAmbient {
+    const SHAPE: &'static [ShapeParameter] = &[];
+    const LOBES: usize = 1;
+    const RECIPROCAL: bool = true;
+    const STARTS: &'static [[f64; MAX_SHAPE]] = &[[0.0; MAX_SHAPE]];
+
+    fn title() -> String {
+        "Lambert with one ambient term".into()
+    }
+    fn citations() -> Vec<&'static str> {
+        vec!["Chen2007"]
+    }
+
+    #[inline(always)]
+    fn basis<N: Number>(normal: [N; 3], shape: &[N], at: &Illumination<N::Real>, optics: &Optics) -> Basis<N> {
+        let mut basis = Lambert::basis(normal, shape, at, optics);
+        basis.specular[0] = N::splat(1.0);
+        basis
+    }
+}
+
+/// The result of the diffuse stage.
+struct Diffuse<const FMA: bool, const C: usize> {
+    normal: [Lane<FMA>; 3],
+    magnitude: [Lane<FMA>; C],
+    ambient: Lane<FMA>,
+    /// Pixels with as many lights outside the threshold as the stage has unknowns.
+    enough: LaneMask,
+    converged: LaneMask,
+}
+
+pub struct PaperFit<'a, M, const FMA: bool, const C: usize> {
+    stack: &'a Stack<'a>,
+    sample: Sample,
+    options: Options,
+    /// Whether the diffuse stage has the ambient term, as Phong's model does.
+    ambient: bool,
+    colour: [Lane<FMA>; C],
+    group: Group<FMA, C>,
+    /// The group with the lights near the highlight left out.
+    far: Group<FMA, C>,
+    grey: Vec<Grey<FMA>>,
+    diffuse_scratch: Scratch<FMA, C, 2>,
+    scratch: Scratch<FMA, C, 3>,
+    model: PhantomData<M>,
+}
+
+impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
+    /// Whether the procedure is defined for the model: one lobe of one shape parameter.
+    pub const APPLIES: bool = M::LOBES == 1 && M::SHAPE.len() == 1;
+    pub const LAYOUT: Layout = Layout::paper(C);
+
+    pub fn new(stack: &'a Stack<'a>, colour: &[f64], sample: Sample, ambient: bool, options: Options) -> Self {
+        PaperFit {
+            stack,
+            sample,
+            options,
+            ambient,
+            colour: std::array::from_fn(|k| Lane::splat(colour[k])),
+            group: Group::new(stack),
+            far: Group::new(stack),
+            grey: Vec::with_capacity(stack.lights.len()),
+            diffuse_scratch: Scratch::new(stack.lights.len()),
+            scratch: Scratch::new(stack.lights.len()),
+            model: PhantomData,
+        }
+    }
+
+    /// Step 2: the lights within the threshold of the pixel's highlight lose their weight.
+    #[inline(always)]
+    fn leave_out_highlight(&mut self) {
+        // Clipped samples are the highlight's brightest: several at once make their mean the peak.
+        let mut brightest = Lane::splat(-1.0);
+        for sample in &self.grey {
+            brightest = brightest.max(sample.radiance);
+        }
+        let mut sum = [Lane::splat(0.0); 3];
+        for (sample, at) in self.grey.iter().zip(&self.group.illuminations) {
+            let at_peak = !sample.radiance.lt(brightest * Lane::splat(0.999));
+            for i in 0..3 {
+                sum[i] = sum[i] + Lane::select(at_peak, at.light[i], Lane::splat(0.0));
+            }
+        }
+        let peak = normalise(sum);
+        let nearest = Lane::splat(self.sample.threshold.cos());
+        self.far.usable_lights = Lane::splat(0.0);
+        self.far.illuminations.clone_from(&self.group.illuminations);
+        for (light, observation) in self.group.observations.iter().enumerate() {
+            let excluded = dot(peak, self.group.illuminations[light].light).gt(nearest);
+            let mut left = *observation;
+            let mut usable = LaneMask::NONE;
+            for k in 0..C {
+                left.weight[k] = Lane::select(excluded, Lane::splat(0.0), left.weight[k]);
+                usable = usable | left.weight[k].positive();
+            }
+            self.far.usable_lights = self.far.usable_lights + Lane::select(usable, Lane::splat(1.0), Lane::splat(0.0));
+            self.far.observations[light] = left;
+        }
+    }
+
+    /// Step 3. Lights in one plane leave φn undetermined: it stays 0, and Ad is then Ad cos φn.
+    #[inline(always)]
+    fn fit_diffuse<D: Model>(&mut self, colour: [Lane<FMA>; C]) -> Diffuse<FMA, C> {
+        let begin = Point {
+            normal: diffuse_normal(&self.grey, &self.far.illuminations, 1),
+            shape_log: [Lane::splat(0.0); MAX_SHAPE],
+        };
+        let unknowns = 3 + usize::from(self.ambient);
+        let enough = !self.far.usable_lights.lt(Lane::splat(unknowns as f64));
+        let mut problem: Separable<'_, D, FMA, C, 2, false> =
+            Separable::new(&self.far, colour, self.options.optics, Loss::Linear, &mut self.diffuse_scratch);
+        let outcome = minimise(&mut problem, &begin, enough, self.options.max_steps);
+        let solution = problem.solve(&outcome.point);
+        problem.give_back(&mut self.diffuse_scratch);
+        Diffuse {
+            normal: outcome.point.normal,
+            magnitude: solution.magnitudes.diffuse,
+            ambient: solution.magnitudes.specular[0],
+            enough,
+            converged: outcome.converged,
+        }
+    }
+
+    /// Step 5, literally.
+    #[inline(always)]
+    fn fit_shape(&mut self, diffuse: &Diffuse<FMA, C>) -> Shape<FMA, C> {
+        let mut problem = ShapeFit::<M, FMA, C>::new(
+            &self.group,
+            diffuse.normal,
+            diffuse.magnitude,
+            self.colour,
+            Lane::splat(self.sample.specular),
+            self.options.optics,
+        );
+        let begin = problem.start();
+        let outcome: Outcome<Tilts<FMA>> = minimise(&mut problem, &begin, diffuse.enough, self.options.max_steps);
+        let normal = problem.normal(outcome.point.phi);
+        // Ad cos φn is what the diffuse stage saw, as its φn was 0.
+        let in_plane = (normal[0] * normal[0] + normal[2] * normal[2]).sqrt();
+        let scale = (diffuse.normal[0] * diffuse.normal[0] + diffuse.normal[2] * diffuse.normal[2]).sqrt() / in_plane;
+        Shape {
+            normal,
+            magnitude: array!(|k| diffuse.magnitude[k] * scale),
+            shape_log: outcome.point.shape_log,
+            view_tilt: outcome.point.view,
+            cost: problem.quadratic(&outcome.point).cost,
+            converged: outcome.converged,
+            at_bound: problem.at_bound(&outcome.point),
+        }
+    }
+
+    /// The refined form of steps 3 and 5.
+    #[inline(always)]
+    fn refine(&mut self, diffuse: &Diffuse<FMA, C>) -> Shape<FMA, C> {
+        let optics = self.options.optics;
+        let specular = [Lane::splat(self.sample.specular), Lane::splat(0.0)];
+        let begin = {
+            let problem = ShapeFit::<M, FMA, C>::new(
+                &self.group,
+                diffuse.normal,
+                diffuse.magnitude,
+                self.colour,
+                specular[0],
+                optics,
+            );
+            problem.start_out_of_plane()
+        };
+        let mut problem: Separable<'_, M, FMA, C, 3, false> =
+            Separable::new(&self.group, self.colour, self.options.optics, Loss::Linear, &mut self.scratch);
+        problem.fixed_specular = Some(specular);
+        let outcome = minimise(&mut problem, &begin, diffuse.enough, self.options.max_steps);
+        let solution = problem.solve(&outcome.point);
+        let at_bound = problem.at_bound(&outcome.point, &solution.magnitudes);
+        problem.give_back(&mut self.scratch);
+        let view = self.group.illuminations[0].view;
+        Shape {
+            normal: outcome.point.normal,
+            magnitude: solution.magnitudes.diffuse,
+            shape_log: outcome.point.shape_log[0],
+            view_tilt: Lane(array!(|i| view[0].0[i].atan2(view[2].0[i]))),
+            cost: solution.quadratic.cost,
+            converged: outcome.converged,
+            at_bound,
+        }
+    }
+
+    #[inline(always)]
+    fn write(&self, diffuse: &Diffuse<FMA, C>, fitted: &Shape<FMA, C>, rows: &mut [f32], status: &mut [u8]) {
+        let width = Self::LAYOUT.width();
+        let mut samples = Lane::splat(0.0);
+        for observation in &self.group.observations {
+            for k in 0..C {
+                let usable = observation.weight[k].positive();
+                samples = samples + Lane::select(usable, Lane::splat(1.0), Lane::splat(0.0));
+            }
+        }
+        let rms = (fitted.cost / samples.max(Lane::splat(1.0))).sqrt();
+        for (lane, status) in status.iter_mut().enumerate() {
+            let row = &mut rows[lane * width..(lane + 1) * width];
+            if !diffuse.enough.holds(lane) {
+                let clipped = self.group.clipped.0[lane] > 0.0 && self.group.usable_lights.0[lane] == 0.0;
+                *status = if clipped { Status::AllClipped } else { Status::TooFewLights } as u8;
+                row.fill(f32::NAN);
+                continue;
+            }
+            let identified = self.sample.specular.is_finite();
+            *status = if !identified {
+                Status::NotIdentified
+            } else if !(fitted.converged & diffuse.converged).holds(lane) {
+                Status::StepLimit
+            } else if fitted.at_bound.holds(lane) {
+                Status::AtBound
+            } else {
+                Status::Converged
+            } as u8;
+            let mut row = Row::new(row);
+            if identified {
+                row.extend(fitted.normal.iter().map(|x| x.0[lane]));
+                row.extend(fitted.magnitude.iter().map(|x| x.0[lane]));
+                row.push(self.sample.specular as f32);
+                row.push(fitted.shape_log.0[lane].exp());
+            } else {
+                row.extend(diffuse.normal.iter().map(|x| x.0[lane]));
+                row.extend(diffuse.magnitude.iter().map(|x| x.0[lane]));
+                row.extend([f32::NAN, f32::NAN]);
+            }
+            row.extend([diffuse.ambient.0[lane]; C]);
+            row.push(if identified { rms.0[lane] } else { f32::NAN });
+            row.push(if identified { fitted.view_tilt.0[lane] } else { f32::NAN });
+        }
+    }
+}
+
+impl<M: Model, const FMA: bool, const C: usize> FitGroup for PaperFit<'_, M, FMA, C> {
+    fn layout(&self) -> Layout {
+        Self::LAYOUT
+    }
+
+    #[inline(always)]
+    fn fit_group(&mut self, first: usize, rows: &mut [f32], status: &mut [u8]) {
+        self.group.gather(self.stack, first);
+        grey(&self.group.observations, &mut self.grey);
+        self.leave_out_highlight();
+        grey(&self.far.observations, &mut self.grey);
+        let diffuse = if self.ambient {
+            self.fit_diffuse::<UniformAmbient>([Lane::splat(1.0); C])
+        } else {
+            self.fit_diffuse::<Lambert>(self.colour)
+        };
+        // From here on the ambient term is known: what remains is diffuse and specular.
+        for observation in &mut self.group.observations {
+            for k in 0..C {
+                observation.radiance[k] = observation.radiance[k] - diffuse.ambient;
+            }
+        }
+        let fitted = if self.sample.refined { self.refine(&diffuse) } else { self.fit_shape(&diffuse) };
+        self.write(&diffuse, &fitted, rows, status);
+    }
+}
+
+/// What the last stage adds.
+struct Shape<const FMA: bool, const C: usize> {
+    normal: [Lane<FMA>; 3],
+    magnitude: [Lane<FMA>; C],
+    shape_log: Lane<FMA>,
+    view_tilt: Lane<FMA>,
+    cost: Lane<FMA>,
+    converged: LaneMask,
+    at_bound: LaneMask,
+}

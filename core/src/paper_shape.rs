@@ -1,0 +1,273 @@
+//! Step 5 of the paper's procedure: the shape of the lobe at one pixel, with the diffuse term and As held.
+//!
+//! Free are the view's tilt θv in the arm's plane (φv = 0), the logarithm of the shape parameter, and an empirical tilt φn
+//! of the normal out of that plane.
+
+use crate::dual::Dual;
+use crate::geometry::{Illumination, dot, normalise};
+use crate::lanes::{Lane, LaneMask, outlined};
+use crate::minimise::{Objective, Quadratic};
+use crate::models::{MAX_SHAPE, Model, Optics};
+use crate::number::{Number, Real, array};
+use crate::observations::Group;
+use crate::separable::Point;
+use std::marker::PhantomData;
+
+/// θv stays within this of its calibrated value, radians: more than any error of the normal should make of it.
+const VIEW_RANGE: f64 = 0.35;
+/// φn lies between 0 and this, radians: its sign cannot be seen.
+const PHI_MAX: f64 = 0.7;
+/// Out-of-plane tilts that the search starts from, radians.
+const PHI_STARTS: [f64; 4] = [0.0, 0.03, 0.09, 0.2];
+
+#[derive(Clone, Copy)]
+pub struct Tilts<const FMA: bool> {
+    pub view: Lane<FMA>,
+    pub shape_log: Lane<FMA>,
+    pub phi: Lane<FMA>,
+}
+
+pub struct ShapeFit<'a, M, const FMA: bool, const C: usize> {
+    group: &'a Group<FMA, C>,
+    normal: [Lane<FMA>; 3],
+    magnitude: [Lane<FMA>; C],
+    colour: [Lane<FMA>; C],
+    specular: Lane<FMA>,
+    optics: Optics,
+    /// θv and φv as calibrated.
+    view: (Lane<FMA>, Lane<FMA>),
+    model: PhantomData<M>,
+}
+
+#[inline(always)]
+fn rotated<R: Real>(normal: [R; 3], sine: R, cosine: R) -> [R; 3] {
+    // The paper's parametrisation keeps θn and gives the normal the tilt φ: (cos φ sin θ, sin φ, cos φ cos θ).
+    let in_plane = (normal[0] * normal[0] + normal[2] * normal[2]).sqrt();
+    [cosine * normal[0] / in_plane, sine, cosine * normal[2] / in_plane]
+}
+
+impl<'a, M: Model, const FMA: bool, const C: usize> ShapeFit<'a, M, FMA, C> {
+    #[inline(always)]
+    pub fn new(
+        group: &'a Group<FMA, C>,
+        normal: [Lane<FMA>; 3],
+        magnitude: [Lane<FMA>; C],
+        colour: [Lane<FMA>; C],
+        specular: Lane<FMA>,
+        optics: Optics,
+    ) -> Self {
+        let view = group.illuminations[0].view;
+        let theta = Lane(array!(|i| view[0].0[i].atan2(view[2].0[i])));
+        let phi = Lane(array!(|i| view[1].0[i].asin()));
+        ShapeFit { group, normal, magnitude, colour, specular, optics, view: (theta, phi), model: PhantomData }
+    }
+
+    #[inline(always)]
+    pub fn normal(&self, phi: Lane<FMA>) -> [Lane<FMA>; 3] {
+        let (sine, cosine) = sine_cosine(phi);
+        rotated(self.normal, sine, cosine)
+    }
+
+    /// The lobe at one light for a view tilted by θv in the arm's plane.
+    #[inline(always)]
+    fn lobe(&self, normal: [Lane<FMA>; 3], shape: Lane<FMA>, light: usize, theta_v: Lane<FMA>) -> Lane<FMA> {
+        let (sine, cosine) = sine_cosine(theta_v);
+        let view = [sine, Lane::splat(0.0), cosine];
+        let at = Illumination::new(self.group.illuminations[light].light, view);
+        let basis = M::basis(normal, &[shape], &at, &self.optics);
+        basis.specular[0]
+    }
+
+    /// What the diffuse term leaves of each channel; the diffuse term keeps the normal of its own fit.
+    #[inline(always)]
+    fn remainder(&self, light: usize) -> [Lane<FMA>; C] {
+        let observation = &self.group.observations[light];
+        let at = &self.group.illuminations[light];
+        let cosine = dot(self.normal, at.light).max(Lane::splat(0.0));
+        array!(|k| observation.radiance[k] - self.magnitude[k] * cosine)
+    }
+
+    #[inline(always)]
+    fn cost(&self, normal: [Lane<FMA>; 3], shape: Lane<FMA>, calibrated: bool) -> Lane<FMA> {
+        outlined::<FMA, _>(
+            #[inline(always)]
+            || self.cost_inline(normal, shape, calibrated),
+        )
+    }
+
+    #[inline(always)]
+    fn cost_inline(&self, normal: [Lane<FMA>; 3], shape: Lane<FMA>, calibrated: bool) -> Lane<FMA> {
+        let mut cost = Lane::splat(0.0);
+        for light in 0..self.group.observations.len() {
+            let lobe = if calibrated {
+                M::basis(normal, &[shape], &self.group.illuminations[light], &self.optics).specular[0]
+            } else {
+                self.lobe(normal, shape, light, self.view.0)
+            };
+            let remainder = self.remainder(light);
+            for k in 0..C {
+                let residual = remainder[k] - self.colour[k] * self.specular * lobe;
+                cost = (self.group.observations[light].weight[k] * residual).mul_add(residual, cost);
+            }
+        }
+        cost
+    }
+
+    /// The best of a grid of shapes and φn, with θv as calibrated.
+    #[inline(always)]
+    pub fn start(&self) -> Tilts<FMA> {
+        let mut best_cost = Lane::splat(f64::from(f32::MAX));
+        let mut best = Tilts { view: self.view.0, shape_log: Lane::splat(0.0), phi: Lane::splat(0.0) };
+        for phi in PHI_STARTS {
+            let normal = self.normal(Lane::splat(phi));
+            for shape in M::STARTS {
+                let cost = self.cost(normal, Lane::splat(shape[0]), false);
+                let better = cost.lt(best_cost);
+                best_cost = Lane::select(better, cost, best_cost);
+                best.shape_log = Lane::select(better, Lane::splat(shape[0].ln()), best.shape_log);
+                best.phi = Lane::select(better, Lane::splat(phi), best.phi);
+            }
+        }
+        best
+    }
+
+    /// The same grid for the calibrated view. The highlight lies at φn = φv/2; its height does not tell on which side of it
+    /// the normal is, so the search begins on the side of the painting's own normal.
+    #[inline(always)]
+    pub fn start_out_of_plane(&self) -> Point<FMA> {
+        let half = self.view.1 * Lane::splat(0.5);
+        let away = Lane::select(half.lt(Lane::splat(0.0)), Lane::splat(1.0), Lane::splat(-1.0));
+        let mut best_cost = Lane::splat(f64::from(f32::MAX));
+        let mut best = Point { normal: self.normal, shape_log: [Lane::splat(0.0); MAX_SHAPE] };
+        for offset in PHI_STARTS {
+            let normal = self.normal(half + away * Lane::splat(offset));
+            for shape in M::STARTS {
+                let cost = self.cost(normal, Lane::splat(shape[0]), true);
+                let better = cost.lt(best_cost);
+                best_cost = Lane::select(better, cost, best_cost);
+                best.shape_log[0] = Lane::select(better, Lane::splat(shape[0].ln()), best.shape_log[0]);
+                for i in 0..3 {
+                    best.normal[i] = Lane::select(better, normal[i], best.normal[i]);
+                }
+            }
+        }
+        best.normal = normalise(best.normal);
+        best
+    }
+
+    #[inline(always)]
+    fn quadratic_inline(&self, point: &Tilts<FMA>) -> Quadratic<FMA, 3> {
+        let shape = point.shape_log.exp();
+        let dual_shape = Dual::<_, 2>::parameter(shape, 0, shape);
+        let (sine, cosine) = sine_cosine(point.phi);
+        let normal = rotated(self.normal, sine, cosine);
+        let slope = rotated(self.normal, cosine, -sine);
+        let dual_normal = array!(|i| Dual::<_, 2>::parameter(normal[i], 1, slope[i]));
+        let (sine, cosine) = sine_cosine(point.view);
+        let view = [sine, Lane::splat(0.0), cosine];
+        // The models carry no derivative by the view: central differences over a small part of the lobe's width serve.
+        let step = (shape * Lane::splat(0.02)).max(Lane::splat(3e-4)).min(Lane::splat(3e-3));
+        let per_step = Lane::splat(0.5) / step;
+
+        let mut quadratic = Quadratic::zero();
+        for light in 0..self.group.observations.len() {
+            let at = Illumination::new(self.group.illuminations[light].light, view);
+            let lobe = M::basis(dual_normal, &[dual_shape], &at, &self.optics).specular[0];
+            let ahead = self.lobe(normal, shape, light, point.view + step);
+            let behind = self.lobe(normal, shape, light, point.view - step);
+            let slopes = [(ahead - behind) * per_step, lobe.derivative[0], lobe.derivative[1]];
+            let remainder = self.remainder(light);
+            for k in 0..C {
+                let weight = self.group.observations[light].weight[k];
+                let scale = self.colour[k] * self.specular;
+                let residual = remainder[k] - scale * lobe.value;
+                quadratic.cost = (weight * residual).mul_add(residual, quadratic.cost);
+                for p in 0..3 {
+                    let weighted = weight * scale * slopes[p];
+                    quadratic.descent[p] = weighted.mul_add(residual, quadratic.descent[p]);
+                    for q in p..3 {
+                        quadratic.hessian[p][q] = (weighted * scale).mul_add(slopes[q], quadratic.hessian[p][q]);
+                    }
+                }
+            }
+        }
+        quadratic
+    }
+
+    #[inline(always)]
+    fn shape_bounds() -> (Lane<FMA>, Lane<FMA>) {
+        (Lane::splat(M::SHAPE[0].lower.ln()), Lane::splat(M::SHAPE[0].upper.ln()))
+    }
+
+    #[inline(always)]
+    pub fn at_bound(&self, point: &Tilts<FMA>) -> LaneMask {
+        let (lower, upper) = Self::shape_bounds();
+        let range = Lane::splat(VIEW_RANGE * 0.999);
+        !point.shape_log.gt(lower)
+            | !point.shape_log.lt(upper)
+            | !(point.view - self.view.0).abs().lt(range)
+            | !point.phi.lt(Lane::splat(PHI_MAX * 0.999))
+    }
+}
+
+/// Sine and cosine of small angles, by their series to the 9th and 8th power: 1e-7 up to 0.8.
+#[inline(always)]
+fn sine_cosine<R: Real>(angle: R) -> (R, R) {
+    let square = angle * angle;
+    let (mut sine, mut cosine) = (R::splat(1.0), R::splat(1.0));
+    for (odd, even) in [(72.0, 56.0), (42.0, 30.0), (20.0, 12.0), (6.0, 2.0)] {
+        sine = R::splat(1.0) - square * sine * R::splat(1.0 / odd);
+        cosine = R::splat(1.0) - square * cosine * R::splat(1.0 / even);
+    }
+    (angle * sine, cosine)
+}
+
+impl<M: Model, const FMA: bool, const C: usize> Objective<FMA, 3> for ShapeFit<'_, M, FMA, C> {
+    type Point = Tilts<FMA>;
+
+    #[inline(always)]
+    fn quadratic(&mut self, point: &Tilts<FMA>) -> Quadratic<FMA, 3> {
+        outlined::<FMA, _>(
+            #[inline(always)]
+            || self.quadratic_inline(point),
+        )
+    }
+
+    #[inline(always)]
+    fn moved(&self, point: &Tilts<FMA>, step: &[Lane<FMA>; 3]) -> Tilts<FMA> {
+        let (lower, upper) = Self::shape_bounds();
+        let (turn, stretch) = (Lane::splat(0.1), Lane::splat(1.2));
+        let range = Lane::splat(VIEW_RANGE);
+        let view = point.view + step[0].min(turn).max(-turn);
+        let shape_log = point.shape_log + step[1].min(stretch).max(-stretch);
+        let phi = point.phi + step[2].min(turn).max(-turn);
+        Tilts {
+            view: view.max(self.view.0 - range).min(self.view.0 + range),
+            shape_log: shape_log.max(lower).min(upper),
+            phi: phi.max(Lane::splat(0.0)).min(Lane::splat(PHI_MAX)),
+        }
+    }
+
+    #[inline(always)]
+    fn blocked(&self, point: &Tilts<FMA>, descent: &[Lane<FMA>; 3]) -> [LaneMask; 3] {
+        let zero = Lane::splat(0.0);
+        let (lower, upper) = Self::shape_bounds();
+        let range = Lane::splat(VIEW_RANGE);
+        let bounds = [
+            (point.view, self.view.0 - range, self.view.0 + range),
+            (point.shape_log, lower, upper),
+            (point.phi, zero, Lane::splat(PHI_MAX)),
+        ];
+        array!(|i| (!bounds[i].0.gt(bounds[i].1) & descent[i].lt(zero))
+            | (!bounds[i].0.lt(bounds[i].2) & descent[i].gt(zero)))
+    }
+
+    #[inline(always)]
+    fn select(mask: LaneMask, yes: &Tilts<FMA>, no: &Tilts<FMA>) -> Tilts<FMA> {
+        Tilts {
+            view: Lane::select(mask, yes.view, no.view),
+            shape_log: Lane::select(mask, yes.shape_log, no.shape_log),
+            phi: Lane::select(mask, yes.phi, no.phi),
+        }
+    }
+}
