@@ -53,7 +53,7 @@ def dome_direction(zenith: ArrayLike, azimuth: ArrayLike) -> Array:
 
 
 def zenith_azimuth(direction: ArrayLike) -> tuple[Array, Array]:
-    """Return zenith and azimuth in radians of directions of shape (..., 3), the inverse of `dome_direction`."""
+    """Return zenith and azimuth in radians of directions (..., 3), the inverse of `dome_direction`."""
     x, y, z = np.moveaxis(np.asarray(direction, dtype=np.float64), -1, 0)
     return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
@@ -76,7 +76,7 @@ def tilt_direction(theta: ArrayLike, phi: ArrayLike) -> Array:
 
 
 def direction_tilts(direction: ArrayLike) -> tuple[Array, Array]:
-    """Return the tilts (θ, φ) in radians of unit vectors of shape (..., 3), the inverse of `tilt_direction`."""
+    """Return the tilts (θ, φ) in radians of unit vectors (..., 3), the inverse of `tilt_direction`."""
     x, y, z = np.moveaxis(np.asarray(direction, dtype=np.float64), -1, 0)
     return np.arctan2(x, z), np.arcsin(np.clip(y, -1.0, 1.0))
 
@@ -102,9 +102,9 @@ class Lights:
 
     names: tuple[str, ...]
     direction: Array
-    position_mm: Array = field(default=None)  # type: ignore[assignment]
-    intensity: Array = field(default=None)  # type: ignore[assignment]
-    angular_size_deg: Array = field(default=None)  # type: ignore[assignment]
+    position_mm: Array = field(default=None)  # type: ignore[arg-type]
+    intensity: Array = field(default=None)  # type: ignore[arg-type]
+    angular_size_deg: Array = field(default=None)  # type: ignore[arg-type]
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -128,9 +128,9 @@ class Lights:
         """Whether any light stands at a finite distance."""
         return bool(np.isfinite(self.position_mm).any())
 
-    def select(self, index: ArrayLike) -> Lights:
+    def select(self, index: ArrayLike | slice) -> Lights:
         """Return the lights at `index` (integers, a slice or a boolean mask), in that order."""
-        rows = np.arange(len(self))[index]
+        rows = np.arange(len(self))[index if isinstance(index, slice) else np.asarray(index)]
         return Lights(
             names=tuple(self.names[row] for row in rows),
             direction=self.direction[rows],

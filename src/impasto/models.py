@@ -1,7 +1,7 @@
 """The reflectance models that have a name, as the core lists them.
 
-A model is one file in core/src/models and one line in its list; names, parameters, help and documentation here
-are read from that list.
+A model is one file in core/src/models and one line in its list; names, parameters, help and documentation
+here are read from that list.
 """
 
 from __future__ import annotations
