@@ -6,6 +6,7 @@ pictures that are in memory anyway.
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from os import PathLike
 from pathlib import Path
@@ -20,6 +21,7 @@ from impasto.errors import OutputError, Problem
 from impasto.images import profile
 
 _TIFF_STRIP_ROWS = 64
+_FULL_DISK_BYTES = 1 << 16
 
 
 class BandWriter:
@@ -219,11 +221,14 @@ def _temporary(path: Path) -> Path:
 
 
 def output_error(path: Path, reason: str) -> OutputError:
-    """Return the error for a file that cannot be written."""
+    """Return the error for a file that cannot be written; a full disk is named, which libraries seldom do."""
+    folder = next((parent for parent in path.absolute().parents if parent.exists()), Path("/"))
+    if shutil.disk_usage(folder).free < _FULL_DISK_BYTES:
+        reason = "there is no room left on the disk"
     return OutputError(
         Problem(
             where=str(path),
-            what=f"cannot be written: {reason}",
+            what=f"cannot be written: {reason.rstrip('.')}",
             do="Make room or choose another folder, then run the same command again",
         )
     )

@@ -99,8 +99,8 @@ def reporting(command: str, json_file: Path | None = None, debug: bool = False) 
     except KeyboardInterrupt:
         code = EXIT_INTERRUPTED
         typer.echo(
-            f"\nimpasto {command}: interrupted. What was finished is kept; "
-            "the same command goes on from there.",
+            f"\nimpasto {command}: interrupted. What is finished is whole; "
+            "run the same command again to go on.",
             err=True,
         )
     except ImpastoError as error:
