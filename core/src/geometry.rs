@@ -85,8 +85,8 @@ impl Place {
     }
 }
 
-/// Two unit vectors that span the plane perpendicular to `normal`, whose z must be positive (Duff et al., "Building an
-/// Orthonormal Basis, Revisited", JCGT 6(1), 2017; their other branch is for z < 0).
+/// Two unit vectors that span the plane perpendicular to `normal`, whose z must be positive ([Duff2017]; their other
+/// branch is for z < 0).
 #[inline(always)]
 pub fn tangents<R: Real>(normal: [R; 3]) -> ([R; 3], [R; 3]) {
     let [x, y, z] = normal;

@@ -143,7 +143,7 @@ fn summarise<M: Model, const FMA: bool, const C: usize, const P: usize, const AM
 }
 
 /// Standard deviations from the Fisher information at the solution. Where the residuals exceed the noise model they are
-/// raised by √χ²_reduced (Birge 1932), for what the model does not describe is then the larger error.
+/// raised by √χ²_reduced [Birge1932], for what the model does not describe is then the larger error.
 struct Deviations<const FMA: bool, const C: usize> {
     /// Root mean square angle between the fitted and the true normal, radians.
     normal: Lane<FMA>,

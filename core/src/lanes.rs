@@ -359,7 +359,7 @@ impl<const FMA: bool> Number for Lane<FMA> {
     }
     #[inline(always)]
     fn ln_1p(self) -> Self {
-        // ln(1 + x) = ln(u) · x / (u − 1) with u = 1 + x rounded (Goldberg 1991, theorem 4): u − 1 is exact.
+        // ln(1 + x) = ln(u) · x / (u − 1) with u = 1 + x rounded ([Goldberg1991], theorem 4): u − 1 is exact.
         let u = Self::splat(1.0) + self;
         let difference = u - Self::splat(1.0);
         let rounded_away = !(difference.abs().positive());

@@ -1,6 +1,6 @@
 //! Bounded Levenberg-Marquardt, eight independent problems side by side.
 //!
-//! Levenberg 1944, Marquardt 1963; damping scaled by the Hessian's diagonal. Each lane has its own damping and stops on its
+//! [Levenberg1944], [Marquardt1963]; damping scaled by the Hessian's diagonal. Each lane has its own damping and stops on its
 //! own; finished lanes keep their point while the others go on (repacking them gained nothing).
 
 use crate::lanes::{Lane, LaneMask};

@@ -1,7 +1,7 @@
 //! The reflectance of a pixel as a separable least-squares problem.
 //!
-//! Radiance is linear in the magnitudes and nonlinear only in the normal and the shape. Variable projection (Golub & Pereyra
-//! 1973, with Kaufman's simplification of the Jacobian, 1975) eliminates the magnitudes at every step: what remains has two
+//! Radiance is linear in the magnitudes and nonlinear only in the normal and the shape. Variable projection [Golub1973]
+//! with Kaufman's simplification of the Jacobian [Kaufman1975] eliminates the magnitudes at every step: what remains has two
 //! parameters for the normal and one for each shape parameter.
 
 use crate::arrow::{Arrow, Factored, Magnitudes};

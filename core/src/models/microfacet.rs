@@ -14,7 +14,7 @@ pub trait Distribution {
     fn evaluate<N: Number>(shape: N, chord_squared: N) -> N;
 }
 
-/// Trowbridge & Reitz 1975 (paper, Eq. 3): D = [c² / ((n·h)² (c² − 1) + 1)]².
+/// [TrowbridgeReitz1975], [Chen2007] Eq. 3: D = [c² / ((n·h)² (c² − 1) + 1)]².
 ///
 /// c is the eccentricity of the ellipsoids, alpha in the form known as GGX: D = π α² D_GGX.
 pub struct TrowbridgeReitz;
@@ -50,7 +50,7 @@ impl Distribution for TrowbridgeReitz {
     }
 }
 
-/// Torrance & Sparrow 1967, Blinn 1977: D = exp(−(δ/m)²) with δ = acos(n·h) the facet's angle.
+/// [TorranceSparrow1967], [Blinn1977]: D = exp(−(δ/m)²) with δ = acos(n·h) the facet's angle.
 pub struct Gaussian;
 
 impl Distribution for Gaussian {
@@ -103,7 +103,7 @@ fn facet_angle_squared<N: Number>(chord_squared: N) -> N {
     sum * chord_squared
 }
 
-/// Fresnel's reflectance of unpolarised light at a smooth dielectric, exactly (Cook & Torrance 1982, Eq. 15).
+/// Fresnel's reflectance of unpolarised light at a smooth dielectric, exactly ([CookTorrance1982], Eq. 15).
 #[inline(always)]
 pub fn fresnel<N: Number>(cosine: N, index: f64) -> N {
     let one = N::splat(1.0);
@@ -128,7 +128,7 @@ pub trait Masking {
     ) -> N;
 }
 
-/// Symmetric V-grooves (Torrance & Sparrow 1967; Blinn 1977): G = min(1, 2 (n·h)(n·v)/(v·h), 2 (n·h)(n·l)/(v·h)).
+/// Symmetric V-grooves ([TorranceSparrow1967], [Blinn1977]): G = min(1, 2 (n·h)(n·v)/(v·h), 2 (n·h)(n·l)/(v·h)).
 pub struct VGroove;
 
 impl Masking for VGroove {
@@ -148,7 +148,7 @@ impl Masking for VGroove {
     }
 }
 
-/// Smith's masking for Trowbridge-Reitz facets, correlated by height (Heitz 2014, Eq. 99; Walter et al. 2007).
+/// Smith's masking for Trowbridge-Reitz facets, correlated by height ([Heitz2014], Eq. 99; [Walter2007]).
 ///
 /// G = 2 (n·l)(n·v) / [(n·v) √(α² + (1 − α²)(n·l)²) + (n·l) √(α² + (1 − α²)(n·v)²)], α = c.
 pub struct Smith;
