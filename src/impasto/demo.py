@@ -68,7 +68,7 @@ def demo(
     photos, store = folder / "photos", folder / "painting.zarr"
     clock = _Clock(say)
     with clock.step("simulate", f"simulate {photos} --dome --lights {_LIGHTS} --size {size[0]},{size[1]}"):
-        simulated = simulate(photos, dome=True, lights=_LIGHTS, size=size)
+        simulated = simulate(photos, dome=True, lights=_LIGHTS, size=size, show_progress=show_progress)
         say(f"{simulated.photographs} photographs of a still life that does not exist")
     with clock.step("stack", f"stack {photos} {store}"):
         stacked = stack(photos, store, show_progress=show_progress)
