@@ -17,7 +17,7 @@ from impasto.joint import Joint, fit_tile
 from impasto.models import ModelSpec, parse_model
 from impasto.procedure import FitOptions, Procedure
 from impasto.progress import progress
-from impasto.pyramid import build_pyramid
+from impasto.pyramid import Pyramid
 from impasto.streaming import fit_units
 
 __all__ = ["PROCEDURES", "FitOptions", "FitSummary", "ModelFit", "fit", "fit_tile"]
@@ -281,15 +281,21 @@ class _Job:
         maps = self.procedure.maps
         group = stores.fit_group(self.model)
         writer = stores.MapsWriter(self.store, group, maps, *self.size, self.attributes)
-        units = writer.unfinished()
+        shared = {key: self.attributes[key] for key in ("program", "version", "model", "settings_sha256")}
+        pyramid = Pyramid(self.store, self.model, maps, self.size, shared)
+
+        def write(unit: stores.Unit, values: stores.Maps) -> None:
+            writer.write(unit, values)
+            pyramid.add(unit, values)
+
+        units = pyramid.in_order(writer.unfinished())
         fitted = sum(unit.pixels for unit in units)
         total = self.size[0] * self.size[1]
         with progress(f"Fitting {self.model}", total, done=total - fitted, show=show_progress) as advance:
-            fit_units(self.stack, self.procedure, writer, units, advance)
-        shared = {key: self.attributes[key] for key in ("program", "version", "model", "settings_sha256")}
-        coarser = sum(height * width for height, width in stores.level_sizes(*self.size))
-        with progress(f"Coarser levels of {self.model}", coarser, show=show_progress) as advance:
-            build_pyramid(self.store, self.model, maps, self.size, shared, advance)
+            fit_units(self.stack, self.procedure, units, write, advance)
+        title = f"Coarser levels of {self.model}"
+        with progress(title, pyramid.missing_pixels(), show=show_progress) as advance:
+            pyramid.finish(advance)
         counts = writer.status_counts()
         pixels = {text: int(counts[code]) for code, text in stores.STATUS_MEANING.items() if counts[code]}
         result = {"pixels": pixels, "clipped_samples": self.stack.clipped_samples}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -67,18 +67,20 @@ def _corners(values: NDArray[Any]) -> list[NDArray[Any]]:
     return [values[row::2, column::2] for row in (0, 1) for column in (0, 1)]
 
 
-_HALVE: dict[str, Callable[[NDArray[Any]], NDArray[Any]]] = {"normal": halve_normal, "status": halve_status}
+def halving(name: str) -> Callable[[NDArray[Any]], NDArray[Any]]:
+    """Return the function that halves the map `name`."""
+    special: dict[str, Callable[[NDArray[Any]], NDArray[Any]]] = {
+        "normal": halve_normal,
+        "status": halve_status,
+    }
+    return special.get(name, halve)
 
 
-def build_pyramid(
-    store: Path,
-    model: str,
-    maps: tuple[stores.Map, ...],
-    size: tuple[int, int],
-    attributes: Mapping[str, Any],
-    advance: Callable[[int], None],
-) -> None:
-    """Write the coarser levels of a fit of which every unit is there; levels that are there are kept.
+class Pyramid:
+    """The coarser levels of a fit.
+
+    Units of the first level are made of units of the fit while those are in memory; `finish` makes from the
+    disk what is missing then.
 
     Parameters
     ----------
@@ -90,39 +92,109 @@ def build_pyramid(
         Height and width of the fit.
     attributes : mapping
         Attributes that each level shares with the fit.
-    advance : callable
-        Called with the number of pixels just written.
-
-    Raises
-    ------
-    StoreError
-        If the disk is full, or a map of the finer level is damaged.
     """
-    finer = stores.Fit(store, stores.fit_group(model), {})
-    with ThreadPoolExecutor(_THREADS, thread_name_prefix="pyramid") as pool:
-        for level, (height, width) in enumerate(stores.level_sizes(*size), start=1):
-            group = stores.coarser_group(model, level)
-            shared = {**attributes, "level": level, "px_per_px": 2**level}
-            writer = stores.MapsWriter(store, group, maps, height, width, shared)
-            for unit in writer.unfinished():
-                _halve_unit(finer, writer, unit, pool)
-                advance(unit.pixels)
-            writer.finish({})
-            finer = stores.Fit(store, group, {})
+
+    def __init__(
+        self,
+        store: Path,
+        model: str,
+        maps: tuple[stores.Map, ...],
+        size: tuple[int, int],
+        attributes: Mapping[str, Any],
+    ) -> None:
+        self._finest = stores.Fit(store, stores.fit_group(model), {})
+        self._size = size
+        self._levels = [
+            stores.MapsWriter(
+                store,
+                stores.coarser_group(model, level),
+                maps,
+                *level_size,
+                {**attributes, "level": level, "px_per_px": 2**level},
+            )
+            for level, level_size in enumerate(stores.level_sizes(*size), start=1)
+        ]
+        self._parent: stores.Unit | None = None
+        self._halves: stores.Maps = {}
+        self._pixels_missing = 0
+
+    @staticmethod
+    def in_order(units: Sequence[stores.Unit]) -> list[stores.Unit]:
+        """Return units of the fit in the order that `add` needs: those of one coarser unit together."""
+        return sorted(units, key=lambda unit: (unit.row // 2, unit.column // 2, unit.row, unit.column))
+
+    def add(self, unit: stores.Unit, maps: stores.Maps) -> None:
+        """Take the maps of a unit that was just written.
+
+        Raises
+        ------
+        StoreError
+            If the disk is full.
+        """
+        if not self._levels:
+            return
+        level = self._levels[0]
+        parent = stores.unit_at(unit.row // 2, unit.column // 2, level.height, level.width)
+        if parent != self._parent:
+            self._parent = parent
+            shape = parent.height, parent.width
+            self._halves = {map.name: np.empty(map.shape(*shape), map.dtype) for map in level.maps}
+            rows, columns = _below(parent, self._size)
+            self._pixels_missing = (rows.stop - rows.start) * (columns.stop - columns.start)
+        row, column = unit.rows.start // 2 - parent.rows.start, unit.columns.start // 2 - parent.columns.start
+        for name, values in maps.items():
+            half = halving(name)(values)
+            self._halves[name][row : row + half.shape[0], column : column + half.shape[1]] = half
+        self._pixels_missing -= unit.pixels
+        if self._pixels_missing == 0:
+            level.write(parent, self._halves)
+
+    def finish(self, advance: Callable[[int], None]) -> None:
+        """Write what is missing of the levels; every unit of the fit must be there.
+
+        Parameters
+        ----------
+        advance : callable
+            Called with the number of pixels just written.
+
+        Raises
+        ------
+        StoreError
+            If the disk is full, or a map of the finer level is damaged.
+        """
+        self._halves = {}
+        finer = self._finest
+        with ThreadPoolExecutor(_THREADS, thread_name_prefix="pyramid") as pool:
+            for level in self._levels:
+                for unit in level.unfinished():
+                    _halve_unit(finer, level, unit, pool)
+                    advance(unit.pixels)
+                level.finish({})
+                finer = stores.Fit(level.store, level.group, {})
+
+    def missing_pixels(self) -> int:
+        """Return how many pixels `finish` has to write."""
+        return sum(unit.pixels for level in self._levels for unit in level.unfinished())
+
+
+def _below(unit: stores.Unit, size: tuple[int, int]) -> tuple[slice, slice]:
+    """Return the rows and columns of the finer level, of `size`, that a unit is made of."""
+    return (
+        slice(2 * unit.rows.start, min(2 * unit.rows.stop, size[0])),
+        slice(2 * unit.columns.start, min(2 * unit.columns.stop, size[1])),
+    )
 
 
 def _halve_unit(
-    finer: stores.Fit, writer: stores.MapsWriter, unit: stores.Unit, pool: ThreadPoolExecutor
+    finer: stores.Fit, level: stores.MapsWriter, unit: stores.Unit, pool: ThreadPoolExecutor
 ) -> None:
-    rows = slice(2 * unit.rows.start, min(2 * unit.rows.stop, finer.shape[0]))
-    columns = slice(2 * unit.columns.start, min(2 * unit.columns.stop, finer.shape[1]))
+    rows, columns = _below(unit, finer.shape)
 
     def halve_map(map: stores.Map) -> None:
         values = finer.read(rows, columns, [map.name])[map.name]
-        halve_values: Callable[[NDArray[Any]], NDArray[Any]] = _HALVE.get(map.name, halve)
-        writer.write_map(unit, map, halve_values(values))
+        level.write_map(unit, map, halving(map.name)(values))
 
-    writer.begin(unit)
-    *others, status = writer.maps
+    level.begin(unit)
+    *others, status = level.maps
     list(pool.map(halve_map, others))
     halve_map(status)

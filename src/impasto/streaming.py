@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.procedure import Procedure
-from impasto.store import STACK_CHUNK, MapsWriter, Stack, Unit
+from impasto.store import STACK_CHUNK, Maps, Stack, Unit
 
 # A tile of the stack, all lights. With one tile read ahead, and one unit of maps on its way to the disk while
 # the next is filled, the whole process stays under 1 GB, whatever the size and number of the photographs. Not
@@ -23,11 +23,11 @@ Tile = tuple[Unit, slice, slice]
 def fit_units(
     stack: Stack,
     procedure: Procedure,
-    writer: MapsWriter,
     units: Sequence[Unit],
+    write: Callable[[Unit, Maps], None],
     advance: Callable[[int], None],
 ) -> None:
-    """Fit units and write them.
+    """Fit units and hand them on to be written.
 
     The calling thread computes (the core has its own threads), one thread reads the next tile, one writes the
     last unit. Ctrl-C ends after the tile and the unit under way.
@@ -36,9 +36,10 @@ def fit_units(
     ----------
     stack : Stack
     procedure : Procedure
-    writer : MapsWriter
     units : sequence of Unit
         Those that have to be fitted.
+    write : callable
+        Called with each unit and its maps, ndarrays of shape (rows, columns[, k]), in another thread.
     advance : callable
         Called with the number of pixels just fitted.
 
@@ -51,14 +52,15 @@ def fit_units(
     tiles = [(unit, *place) for unit in units for place in unit.tiles(height, STACK_CHUNK)]
     with (
         ThreadPoolExecutor(1, thread_name_prefix="read") as reader,
-        ThreadPoolExecutor(1, thread_name_prefix="write") as unit_writer,
+        ThreadPoolExecutor(1, thread_name_prefix="write") as writer,
     ):
         written: Future[None] | None = None
-        maps: dict[str, NDArray[Any]] = {}
-        for (unit, rows, columns), radiance in _read_ahead(stack, procedure, tiles, reader):
+        maps: Maps = {}
+        for (unit, rows, columns), radiance in _read_ahead(stack, procedure, tiles, height, reader):
             if not maps:
                 maps = {
-                    map.name: np.empty(map.shape(unit.height, unit.width), map.dtype) for map in writer.maps
+                    map.name: np.empty(map.shape(unit.height, unit.width), map.dtype)
+                    for map in procedure.maps
                 }
             fitted = procedure.fit(radiance, rows, columns)
             inside = (_shifted(rows, unit.rows), _shifted(columns, unit.columns))
@@ -69,7 +71,7 @@ def fit_units(
             if (rows.stop, columns.stop) == (unit.rows.stop, unit.columns.stop):
                 if written is not None:
                     written.result()
-                written = unit_writer.submit(writer.write, unit, maps)
+                written = writer.submit(write, unit, maps)
                 maps = {}
         if written is not None:
             written.result()
@@ -77,29 +79,33 @@ def fit_units(
 
 def _tile_rows(stack: Stack, procedure: Procedure) -> int:
     """Return how many rows of a chunk's width make a tile: the whole chunk, or less where lights are many."""
-    lights, _, _, channels = stack.shape
-    if procedure.lights is not None:
-        lights = len(procedure.lights)
-    row_bytes = lights * STACK_CHUNK * channels * stack.dtype.itemsize
     rows = STACK_CHUNK
-    while rows > 32 and rows * row_bytes > _TILE_BYTES:
+    while rows > 32 and _elements(stack, procedure, rows) * stack.dtype.itemsize > _TILE_BYTES:
         rows //= 2
     return rows
 
 
+def _elements(stack: Stack, procedure: Procedure, rows: int) -> int:
+    """Return the number of samples in a tile of `rows` rows."""
+    lights, _, _, channels = stack.shape
+    return (lights if procedure.lights is None else len(procedure.lights)) * rows * STACK_CHUNK * channels
+
+
 def _read_ahead(
-    stack: Stack, procedure: Procedure, tiles: Sequence[Tile], reader: ThreadPoolExecutor
+    stack: Stack, procedure: Procedure, tiles: Sequence[Tile], rows: int, reader: ThreadPoolExecutor
 ) -> Iterator[tuple[Tile, NDArray[Any]]]:
-    """Yield each tile with its stored values, while the next is being read."""
-    coming: Future[NDArray[Any]] | None = None
+    """Yield each tile with its stored values, valid until the next, while the next is being read."""
+    buffers = [np.empty(_elements(stack, procedure, rows), stack.dtype) for _ in range(2)]
+
+    def read(number: int) -> NDArray[Any]:
+        _, rows, columns = tiles[number]
+        return stack.read(rows, columns, procedure.lights, buffers[number % 2])
+
+    coming = reader.submit(read, 0) if tiles else None
     for number, tile in enumerate(tiles):
-        now = coming or reader.submit(stack.read, tile[1], tile[2], procedure.lights)
-        values = now.result()
-        del now
-        coming = None
-        if number + 1 < len(tiles):
-            _, rows, columns = tiles[number + 1]
-            coming = reader.submit(stack.read, rows, columns, procedure.lights)
+        assert coming is not None
+        values = coming.result()
+        coming = reader.submit(read, number + 1) if number + 1 < len(tiles) else None
         yield tile, values
 
 

@@ -35,6 +35,7 @@ from impasto.store.layout import (
     Unit,
     fit_maps,
     level_sizes,
+    unit_at,
     units,
 )
 from impasto.store.stack_writer import StackHeader, StackWriter
@@ -83,6 +84,7 @@ __all__ = [
     "size_on_disk",
     "source_problems",
     "target_problems",
+    "unit_at",
     "units",
 ]
 

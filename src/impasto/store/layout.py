@@ -164,15 +164,20 @@ class Unit:
                 )
 
 
+def unit_at(row: int, column: int, height: int, width: int) -> Unit:
+    """Return one unit of an image of `height` x `width` pixels, by its number from the top and the left."""
+    return Unit(
+        row=row,
+        column=column,
+        rows=slice(row * UNIT, min((row + 1) * UNIT, height)),
+        columns=slice(column * UNIT, min((column + 1) * UNIT, width)),
+    )
+
+
 def units(height: int, width: int) -> list[Unit]:
     """Return the units of an image of `height` x `width` pixels, row by row."""
     return [
-        Unit(
-            row=row,
-            column=column,
-            rows=slice(row * UNIT, min((row + 1) * UNIT, height)),
-            columns=slice(column * UNIT, min((column + 1) * UNIT, width)),
-        )
+        unit_at(row, column, height, width)
         for row in range(-(-height // UNIT))
         for column in range(-(-width // UNIT))
     ]

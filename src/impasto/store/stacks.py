@@ -118,7 +118,13 @@ class Stack:
         """Number of clipped samples over all photographs and channels."""
         return sum(int(entry["clipped_samples"]) for entry in self.attributes["inputs"])
 
-    def read(self, rows: slice, columns: slice, lights: ArrayLike | None = None) -> NDArray[Any]:
+    def read(
+        self,
+        rows: slice,
+        columns: slice,
+        lights: ArrayLike | None = None,
+        buffer: NDArray[Any] | None = None,
+    ) -> NDArray[Any]:
         """Return stored values of a tile.
 
         Parameters
@@ -127,6 +133,9 @@ class Stack:
             The tile, with start and stop.
         lights : array_like of int, optional
             Which lights, all by default.
+        buffer : ndarray of shape (n,), optional
+            Memory for the result, of the stack's type and at least as many elements; a stream of tiles that
+            uses the same memory again spares the system half of the work.
 
         Returns
         -------
@@ -138,24 +147,25 @@ class Stack:
         StoreError
             Listing every photograph whose stored pixels are damaged.
         """
+        count, _, _, channels = self.shape
+        index = np.arange(count) if lights is None else np.asarray(lights, dtype=np.intp)
+        shape = (len(index), rows.stop - rows.start, columns.stop - columns.start, channels)
+        tile = np.empty(shape, self.dtype) if buffer is None else buffer[: math.prod(shape)].reshape(shape)
         try:
-            return self._read(rows, columns, lights)
+            self._read_into(tile, index, rows, columns)
         except (OSError, RuntimeError, ValueError) as error:
             raise StoreError(self._damage(rows, columns, error)) from error
+        return tile
 
-    def _read(self, rows: slice, columns: slice, lights: ArrayLike | None) -> NDArray[Any]:
-        if lights is None:
-            return np.asarray(self._radiance[:, rows, columns, :])
-        index = np.asarray(lights, dtype=np.intp)
-        tile = np.empty(
-            (len(index), rows.stop - rows.start, columns.stop - columns.start, self.shape[3]), self.dtype
-        )
+    def _read_into(self, tile: NDArray[Any], index: NDArray[np.intp], rows: slice, columns: slice) -> None:
+        from zarr.buffer.cpu import NDBuffer
+
         # Runs of neighbouring lights keep to slices, the only selection that the Rust codecs take.
         for run in np.split(np.arange(len(index)), np.flatnonzero(np.diff(index) != 1) + 1):
             if len(run):
-                first, last = int(index[run[0]]), int(index[run[-1]])
-                tile[run[0] : run[-1] + 1] = self._radiance[first : last + 1, rows, columns, :]
-        return tile
+                part = tile[run[0] : run[-1] + 1]
+                selection = (slice(int(index[run[0]]), int(index[run[-1]]) + 1), rows, columns, slice(None))
+                self._radiance.get_basic_selection(selection, out=NDBuffer.from_numpy_array(part))
 
     def _damage(self, rows: slice, columns: slice, error: Exception) -> list[Problem]:
         problems = []
@@ -163,7 +173,7 @@ class Stack:
         where = f"rows {rows.start} to {rows.stop - 1}, columns {columns.start} to {columns.stop - 1}"
         for light, entry in enumerate(self.attributes["inputs"]):
             try:
-                self._read(rows, columns, [light])
+                self._radiance[light : light + 1, rows, columns]
             except (OSError, RuntimeError, ValueError) as cause:
                 problems.append(Problem(place, f"{entry['name']} is damaged at {where}: {cause}", _AGAIN))
         return problems or [Problem(place, f"cannot be read at {where}: {error}", _AGAIN)]
