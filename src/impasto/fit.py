@@ -24,9 +24,6 @@ __all__ = ["PROCEDURES", "FitOptions", "FitSummary", "ModelFit", "fit", "fit_til
 
 PROCEDURES: dict[str, Callable[[stores.Stack, ModelSpec, FitOptions], Procedure]] = {"joint": Joint}
 
-# Maps hardly compress, because their last bits are noise.
-_STORED_SHARE = 0.9
-
 
 @dataclass(frozen=True)
 class ModelFit:
@@ -268,7 +265,8 @@ class _Job:
         per_pixel = sum(map.size * np.dtype(map.dtype).itemsize for map in self.procedure.maps)
         groups = (stores.fit_group(self.model), f"{stores.PYRAMIDS}/{self.model}")
         there = sum(stores.size_on_disk(self.store / group) for group in groups)
-        return int(self.size[0] * self.size[1] * per_pixel * 4 / 3 * _STORED_SHARE) - there
+        # A third more for the coarser levels; nothing less for compression, because the last bits are noise.
+        return self.size[0] * self.size[1] * per_pixel * 4 // 3 - there
 
     def run(self, overwrite: bool, show_progress: bool | None) -> ModelFit:
         """Fit what is missing, then write the coarser levels, then declare the fit complete."""
