@@ -186,7 +186,7 @@ def _errors(evaluated: EvaluateSummary) -> tuple[list[str], list[list[str]]]:
     _, names, rows = tables[0]
     columns = range(2, len(names))
     header = [*names[:2]] + [
-        f"{names[column]}, {_title(model.model)}" for column in columns for model in evaluated.models
+        f"{names[column]}\n{_title(model.model)}" for column in columns for model in evaluated.models
     ]
     cells = [
         [*row[:2]] + [table[2][index][column] for column in columns for table in tables]

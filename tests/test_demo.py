@@ -1,0 +1,80 @@
+"""The demo runs the whole pipeline, and its page needs nothing but itself."""
+
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+import impasto
+from impasto.errors import OutputError
+from impasto.summary_page import Picture, SummaryPage
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    said = []
+    summary = impasto.demo(tmp_path_factory.mktemp("demo") / "out", size=(48, 36), say=said.append)
+    return summary, said
+
+
+class Balance(HTMLParser):
+    """Check that tags are closed in the order in which they were opened."""
+
+    def __init__(self):
+        super().__init__()
+        self.open = []
+        self.seen = []
+
+    def handle_starttag(self, tag, attrs):
+        self.seen.append((tag, dict(attrs)))
+        if tag not in ("meta", "img"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_the_page_loads_nothing_from_anywhere(made):
+    page = made[0].page.read_text(encoding="utf-8")
+    parser = Balance()
+    parser.feed(page)
+    assert parser.open == []
+    pictures = [attributes for tag, attributes in parser.seen if tag == "img"]
+    assert len(pictures) > 12
+    assert all(picture["src"].startswith("data:image/") and picture["alt"] for picture in pictures)
+    assert not {"script", "link", "iframe"} & {tag for tag, _ in parser.seen}
+    assert not re.findall(r"(?:href|src)=.https?:|url\(", page)
+
+
+def test_the_page_holds_the_errors_that_were_found(made):
+    summary, _ = made
+    page = summary.page.read_text(encoding="utf-8")
+    for model in summary.evaluated.models:
+        assert not model.refitted
+        assert f"<td>{model.mean.psnr_db:.2f}</td>" in page
+        assert f"<td>{model.mean.ssim:.4f}</td>" in page
+
+
+def test_each_step_is_announced_as_the_command_that_does_it(made):
+    summary, said = made
+    commands = [line.split()[2] for line in said if line.strip().startswith("$ impasto")]
+    assert commands == ["simulate", "stack", "fit", "evaluate", "render", "maps"] == list(summary.steps)
+
+
+def test_a_demo_replaces_a_demo_and_nothing_else(made, tmp_path):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "thesis.txt").write_text("years of work")
+    with pytest.raises(OutputError, match="not made by impasto demo"):
+        impasto.demo(folder)
+    assert [path.name for path in folder.iterdir()] == ["thesis.txt"]
+
+
+def test_words_on_a_page_are_words():
+    page = SummaryPage("a < b", "& so on")
+    page.table(("<i>",), [("x & y",)])
+    page.pictures([Picture(b"png", '"quoted" <b>')])
+    html = page.html()
+    assert "<i>" not in html
+    assert "<b>" not in html
+    assert "x &amp; y" in html
