@@ -72,13 +72,15 @@ struct ChannelSums<const FMA: bool> {
 pub struct Arrow<const FMA: bool, const C: usize> {
     channel: [ChannelSums<FMA>; C],
     specular_specular: [[Lane<FMA>; MAX_LOBES]; MAX_LOBES],
+    /// Whether the ambient magnitudes are fitted.
+    ambient: bool,
     /// Projections of the data on the basis functions.
     pub right: Magnitudes<FMA, C>,
 }
 
 impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
     #[inline(always)]
-    pub fn zero() -> Self {
+    pub fn new(ambient: bool) -> Self {
         let zero = Lane::splat(0.0);
         let sums = ChannelSums {
             diffuse_diffuse: zero,
@@ -87,12 +89,17 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
             diffuse_specular: [zero; MAX_LOBES],
             one_specular: [zero; MAX_LOBES],
         };
-        Arrow { channel: [sums; C], specular_specular: [[zero; MAX_LOBES]; MAX_LOBES], right: Magnitudes::zero() }
+        Arrow {
+            channel: [sums; C],
+            specular_specular: [[zero; MAX_LOBES]; MAX_LOBES],
+            ambient,
+            right: Magnitudes::zero(),
+        }
     }
 
     /// Adds one light: its basis values, and per channel radiance and weight. `colour` is the light's.
     #[inline(always)]
-    pub fn add<const AMBIENT: bool>(
+    pub fn add(
         &mut self,
         lobes: usize,
         diffuse: Lane<FMA>,
@@ -110,7 +117,7 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
             let coloured = weight[k] * colour[k];
             sums.diffuse_diffuse = weighted.mul_add(diffuse, sums.diffuse_diffuse);
             self.right.diffuse[k] = weighted.mul_add(radiance[k], self.right.diffuse[k]);
-            if AMBIENT {
+            if self.ambient {
                 sums.diffuse_one = sums.diffuse_one + weighted;
                 sums.one_one = sums.one_one + weight[k];
                 self.right.ambient[k] = weight[k].mul_add(radiance[k], self.right.ambient[k]);
@@ -121,7 +128,7 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
                 let coloured_diffuse = coloured * diffuse;
                 for j in 0..lobes {
                     sums.diffuse_specular[j] = coloured_diffuse.mul_add(specular[j], sums.diffuse_specular[j]);
-                    if AMBIENT {
+                    if self.ambient {
                         sums.one_specular[j] = coloured.mul_add(specular[j], sums.one_specular[j]);
                     }
                 }
@@ -138,7 +145,7 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
 
     /// Eliminates the channels' blocks.
     #[inline(always)]
-    fn factor<const AMBIENT: bool>(&self, lobes: usize, free: &Free<C>) -> Factored<FMA, C> {
+    fn factor(&self, lobes: usize, free: &Free<C>) -> Factored<FMA, C> {
         let zero = Lane::splat(0.0);
         let one = Lane::splat(1.0);
         let mut inverse = [BlockInverse { diffuse: zero, cross: zero, ambient: zero }; C];
@@ -147,7 +154,7 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
             let lit = free.diffuse[k] & sums.diffuse_diffuse.gt(Lane::splat(1e-30));
             let alone = Lane::select(lit, one / sums.diffuse_diffuse, zero);
             inverse[k].diffuse = alone;
-            if AMBIENT {
+            if self.ambient {
                 // Where all lights meet the surface at one angle, Ad and Ae are one: Ae is then 0.
                 let product = sums.diffuse_diffuse * sums.one_one;
                 let determinant = product - sums.diffuse_one * sums.diffuse_one;
@@ -169,9 +176,9 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
                 for k in 0..C {
                     let sums = &self.channel[k];
                     let (diffuse, ambient) =
-                        inverse[k].apply::<AMBIENT>(sums.diffuse_specular[j], sums.one_specular[j]);
+                        inverse[k].apply(self.ambient, sums.diffuse_specular[j], sums.one_specular[j]);
                     schur[i][j] = schur[i][j] - sums.diffuse_specular[i] * diffuse;
-                    if AMBIENT {
+                    if self.ambient {
                         schur[i][j] = schur[i][j] - sums.one_specular[i] * ambient;
                     }
                 }
@@ -186,27 +193,27 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
                 schur[i][j] = Lane::select(free.specular[i] & free.specular[j], schur[i][j], zero);
             }
         }
-        Factored { channel: self.channel, lobes, inverse, schur }
+        Factored { channel: self.channel, lobes, ambient: self.ambient, inverse, schur }
     }
 
     /// The magnitudes that fit best, none of them negative, and the factored equations of those that are not held at 0.
     #[inline(always)]
-    pub fn magnitudes<const AMBIENT: bool>(&self, lobes: usize) -> (Magnitudes<FMA, C>, Factored<FMA, C>) {
+    pub fn magnitudes(&self, lobes: usize) -> (Magnitudes<FMA, C>, Factored<FMA, C>) {
         outlined::<FMA, _>(
             #[inline(always)]
-            || self.nonnegative::<AMBIENT>(lobes),
+            || self.nonnegative(lobes),
         )
     }
 
     #[inline(always)]
-    fn nonnegative<const AMBIENT: bool>(&self, lobes: usize) -> (Magnitudes<FMA, C>, Factored<FMA, C>) {
+    fn nonnegative(&self, lobes: usize) -> (Magnitudes<FMA, C>, Factored<FMA, C>) {
         let zero = Lane::splat(0.0);
-        let mut free = Free::new(lobes, AMBIENT);
+        let mut free = Free::new(lobes, self.ambient);
         // Holding every negative magnitude at 0 at once is not quite the constrained optimum where two of them are negative
         // only together; the next step of the fit begins from here again and mends it.
         let (mut best, factored) = loop {
-            let factored = self.factor::<AMBIENT>(lobes, &free);
-            let best = factored.solve_inline::<AMBIENT>(&self.right);
+            let factored = self.factor(lobes, &free);
+            let best = factored.solve_inline(&self.right);
             let mut violated = LaneMask::NONE;
             for j in 0..lobes {
                 let negative = best.specular[j].lt(zero) & free.specular[j];
@@ -217,7 +224,7 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
                 let negative = best.diffuse[k].lt(zero) & free.diffuse[k];
                 free.diffuse[k] = free.diffuse[k] & !negative;
                 violated = violated | negative;
-                if AMBIENT {
+                if self.ambient {
                     let negative = best.ambient[k].lt(zero) & free.ambient[k];
                     free.ambient[k] = free.ambient[k] & !negative;
                     violated = violated | negative;
@@ -249,8 +256,8 @@ struct BlockInverse<const FMA: bool> {
 
 impl<const FMA: bool> BlockInverse<FMA> {
     #[inline(always)]
-    fn apply<const AMBIENT: bool>(&self, diffuse: Lane<FMA>, ambient: Lane<FMA>) -> (Lane<FMA>, Lane<FMA>) {
-        if AMBIENT {
+    fn apply(&self, with_ambient: bool, diffuse: Lane<FMA>, ambient: Lane<FMA>) -> (Lane<FMA>, Lane<FMA>) {
+        if with_ambient {
             (self.diffuse.mul_add(diffuse, self.cross * ambient), self.cross.mul_add(diffuse, self.ambient * ambient))
         } else {
             (self.diffuse * diffuse, Lane::splat(0.0))
@@ -263,25 +270,26 @@ impl<const FMA: bool> BlockInverse<FMA> {
 pub struct Factored<const FMA: bool, const C: usize> {
     channel: [ChannelSums<FMA>; C],
     lobes: usize,
+    pub ambient: bool,
     inverse: [BlockInverse<FMA>; C],
     schur: [[Lane<FMA>; MAX_LOBES]; MAX_LOBES],
 }
 
 impl<const FMA: bool, const C: usize> Factored<FMA, C> {
     #[inline(always)]
-    pub fn solve<const AMBIENT: bool>(&self, right: &Magnitudes<FMA, C>) -> Magnitudes<FMA, C> {
+    pub fn solve(&self, right: &Magnitudes<FMA, C>) -> Magnitudes<FMA, C> {
         outlined::<FMA, _>(
             #[inline(always)]
-            || self.solve_inline::<AMBIENT>(right),
+            || self.solve_inline(right),
         )
     }
 
     #[inline(always)]
-    fn solve_inline<const AMBIENT: bool>(&self, right: &Magnitudes<FMA, C>) -> Magnitudes<FMA, C> {
+    fn solve_inline(&self, right: &Magnitudes<FMA, C>) -> Magnitudes<FMA, C> {
         let mut result = *right;
         for k in 0..C {
             (result.diffuse[k], result.ambient[k]) =
-                self.inverse[k].apply::<AMBIENT>(right.diffuse[k], right.ambient[k]);
+                self.inverse[k].apply(self.ambient, right.diffuse[k], right.ambient[k]);
         }
         if self.lobes == 0 {
             return result;
@@ -290,7 +298,7 @@ impl<const FMA: bool, const C: usize> Factored<FMA, C> {
             for k in 0..C {
                 let sums = &self.channel[k];
                 result.specular[j] = result.specular[j] - sums.diffuse_specular[j] * result.diffuse[k];
-                if AMBIENT {
+                if self.ambient {
                     result.specular[j] = result.specular[j] - sums.one_specular[j] * result.ambient[k];
                 }
             }
@@ -302,11 +310,11 @@ impl<const FMA: bool, const C: usize> Factored<FMA, C> {
             let mut ambient = right.ambient[k];
             for j in 0..self.lobes {
                 diffuse = diffuse - sums.diffuse_specular[j] * result.specular[j];
-                if AMBIENT {
+                if self.ambient {
                     ambient = ambient - sums.one_specular[j] * result.specular[j];
                 }
             }
-            (result.diffuse[k], result.ambient[k]) = self.inverse[k].apply::<AMBIENT>(diffuse, ambient);
+            (result.diffuse[k], result.ambient[k]) = self.inverse[k].apply(self.ambient, diffuse, ambient);
         }
         result
     }

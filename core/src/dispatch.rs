@@ -15,6 +15,9 @@ use rayon::prelude::*;
 /// Pixels that one thread takes at a time: enough to hide the start of a task, few enough to share a tile evenly.
 const BLOCK: usize = 64 * LANES;
 
+/// Channels that the fit is compiled for: stacks of fewer leave the rest without weight.
+pub const MAX_CHANNELS: usize = 3;
+
 /// What Python, the help and the documentation say of a model.
 pub struct Entry {
     pub name: &'static str,
@@ -58,9 +61,9 @@ fn fit_block_fast<F: FitGroup>(fit: &mut F, block: usize, rows: &mut [f32], stat
 /// Fits a tile with all threads: `fast` makes the fit for AVX2 and FMA, `plain` the one for any processor.
 fn fit_tile<Fast: FitGroup, Plain: FitGroup>(
     pixels: usize,
-    layout: Layout,
     fast: impl Fn() -> Fast + Sync + Send,
     plain: impl Fn() -> Plain + Sync + Send,
+    layout: Layout,
 ) -> Fitted {
     let width = layout.width();
     let mut rows = vec![0.0; pixels * width];
@@ -82,35 +85,24 @@ fn fit_tile<Fast: FitGroup, Plain: FitGroup>(
     Fitted { layout, rows, status }
 }
 
-fn fit_joint<M: Model, const C: usize, const P: usize, const AMBIENT: bool>(
-    stack: &Stack,
-    colour: &[f64],
-    options: Options,
-) -> Option<Fitted> {
-    Some(fit_tile(
+fn fit_joint<M: Model, const P: usize>(stack: &Stack, colour: &[f64], options: Options) -> Fitted {
+    fit_tile(
         stack.pixels,
-        JointFit::<M, true, C, P, AMBIENT>::LAYOUT,
-        || JointFit::<M, true, C, P, AMBIENT>::new(stack, colour, options),
-        || JointFit::<M, false, C, P, AMBIENT>::new(stack, colour, options),
-    ))
+        || JointFit::<M, true, MAX_CHANNELS, P>::new(stack, colour, options),
+        || JointFit::<M, false, MAX_CHANNELS, P>::new(stack, colour, options),
+        JointFit::<M, true, MAX_CHANNELS, P>::layout(stack.channels, options.ambient),
+    )
 }
 
-fn fit_paper<M: Model, const C: usize>(
-    ambient: bool,
-    stack: &Stack,
-    colour: &[f64],
-    sample: Sample,
-    options: Options,
-) -> Option<Fitted> {
-    if !PaperFit::<M, true, C>::APPLIES {
-        return None;
-    }
-    Some(fit_tile(
-        stack.pixels,
-        PaperFit::<M, true, C>::LAYOUT,
-        || PaperFit::<M, true, C>::new(stack, colour, sample, ambient, options),
-        || PaperFit::<M, false, C>::new(stack, colour, sample, ambient, options),
-    ))
+fn fit_paper<M: Model>(stack: &Stack, colour: &[f64], sample: Sample, options: Options) -> Option<Fitted> {
+    PaperFit::<M, true, MAX_CHANNELS>::APPLIES.then(|| {
+        fit_tile(
+            stack.pixels,
+            || PaperFit::<M, true, MAX_CHANNELS>::new(stack, colour, sample, options),
+            || PaperFit::<M, false, MAX_CHANNELS>::new(stack, colour, sample, options),
+            Layout::paper(stack.channels),
+        )
+    })
 }
 
 #[inline(always)]
@@ -169,15 +161,12 @@ macro_rules! dispatch {
             }),*]
         }
 
-        /// Fits a tile; `None` if no model has the name or the number of channels is neither 1 nor 3.
-        pub fn fit(name: &str, ambient: bool, stack: &Stack, colour: &[f64], options: Options) -> Option<Fitted> {
-            match (name, colour.len(), ambient) {
+        /// Fits a tile; `None` if no model has the name.
+        pub fn fit(name: &str, stack: &Stack, colour: &[f64], options: Options) -> Option<Fitted> {
+            match name {
                 $(
-                    ($name, 1, false) => fit_joint::<$model, 1, { 2 + <$model>::SHAPE.len() }, false>(stack, colour, options),
-                    ($name, 1, true) => fit_joint::<$model, 1, { 2 + <$model>::SHAPE.len() }, true>(stack, colour, options),
-                    ($name, 3, false) => fit_joint::<$model, 3, { 2 + <$model>::SHAPE.len() }, false>(stack, colour, options),
-                    ($name, 3, true) => fit_joint::<$model, 3, { 2 + <$model>::SHAPE.len() }, true>(stack, colour, options),
-                )*
+                    $name => Some(fit_joint::<$model, { 2 + <$model>::SHAPE.len() }>(stack, colour, options)),
+                                    )*
                 _ => None,
             }
         }
@@ -185,16 +174,14 @@ macro_rules! dispatch {
         /// Fits a tile by the paper's procedure; `None` also where that is not defined for the model.
         pub fn paper(
             name: &str,
-            ambient: bool,
             stack: &Stack,
             colour: &[f64],
             sample: Sample,
             options: Options,
         ) -> Option<Fitted> {
-            match (name, colour.len()) {
+            match name {
                 $(
-                    ($name, 1) => fit_paper::<$model, 1>(ambient, stack, colour, sample, options),
-                    ($name, 3) => fit_paper::<$model, 3>(ambient, stack, colour, sample, options),
+                    $name => fit_paper::<$model>(stack, colour, sample, options),
                 )*
                 _ => None,
             }

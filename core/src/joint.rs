@@ -15,10 +15,11 @@ pub struct Options {
     pub optics: Optics,
     pub loss: Loss,
     pub max_steps: usize,
+    pub ambient: bool,
 }
 
 /// The fit of groups of eight pixels, with its buffers.
-pub struct JointFit<'a, M, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool> {
+pub struct JointFit<'a, M, const FMA: bool, const C: usize, const P: usize> {
     stack: &'a Stack<'a>,
     options: Options,
     colour: [Lane<FMA>; C],
@@ -28,13 +29,15 @@ pub struct JointFit<'a, M, const FMA: bool, const C: usize, const P: usize, cons
     model: PhantomData<M>,
 }
 
-impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool>
-    JointFit<'a, M, FMA, C, P, AMBIENT>
-{
-    pub const LAYOUT: Layout = Layout::joint(C, M::LOBES, P - 2, if AMBIENT { C } else { 0 });
+impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> JointFit<'a, M, FMA, C, P> {
+    pub fn layout(channels: usize, ambient: bool) -> Layout {
+        Layout::joint(channels, M::LOBES, P - 2, if ambient { channels } else { 0 })
+    }
 
     /// Unknowns that each channel's samples must determine.
-    const UNKNOWNS: usize = P + 1 + M::LOBES + AMBIENT as usize;
+    fn unknowns(&self) -> usize {
+        P + 1 + M::LOBES + usize::from(self.options.ambient)
+    }
 
     pub fn new(stack: &'a Stack<'a>, colour: &[f64], options: Options) -> Self {
         const { assert!(P == 2 + M::SHAPE.len()) };
@@ -50,35 +53,36 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIEN
     }
 }
 
-impl<M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool> FitGroup
-    for JointFit<'_, M, FMA, C, P, AMBIENT>
-{
+impl<M: Model, const FMA: bool, const C: usize, const P: usize> FitGroup for JointFit<'_, M, FMA, C, P> {
     fn layout(&self) -> Layout {
-        Self::LAYOUT
+        Self::layout(self.stack.channels, self.options.ambient)
     }
 
     #[inline(always)]
     fn fit_group(&mut self, first: usize, rows: &mut [f32], status: &mut [u8]) {
         self.group.gather(self.stack, first);
-        grey(&self.group.observations, &mut self.grey);
-        let wanted = !self.group.usable_lights.lt(Lane::splat(Self::UNKNOWNS as f64));
-        let begin = start::<M, FMA, AMBIENT>(&self.grey, &self.group.illuminations, &self.options.optics);
+        grey(&self.group, &mut self.grey);
+        let wanted = !self.group.usable_lights.lt(Lane::splat(self.unknowns() as f64));
+        let begin = start::<M, FMA>(&self.grey, &self.group.illuminations, &self.options.optics, self.options.ambient);
 
-        let mut problem = Separable::<M, FMA, C, P, AMBIENT>::new(
+        let mut problem = Separable::<M, FMA, C, P>::new(
             &self.group,
             self.colour,
             self.options.optics,
             self.options.loss,
+            self.options.ambient,
             &mut self.scratch,
         );
         let outcome = minimise(&mut problem, &begin, wanted, self.options.max_steps);
         let solution = problem.solve(&outcome.point);
         let summary = summarise(&problem, &solution);
         let at_bound = problem.at_bound(&outcome.point, &solution.magnitudes);
-        let deviations = Deviations::new::<P, AMBIENT>(M::LOBES, &solution, summary.chi2_reduced);
+        let deviations = Deviations::new::<P>(M::LOBES, &solution, summary.chi2_reduced);
         problem.give_back(&mut self.scratch);
 
-        let width = Self::LAYOUT.width();
+        let channels = self.stack.channels;
+        let ambient = if self.options.ambient { channels } else { 0 };
+        let width = FitGroup::layout(self).width();
         for (lane, status) in status.iter_mut().enumerate() {
             *status = if !wanted.holds(lane) {
                 if self.group.clipped.0[lane] > 0.0 && self.group.usable_lights.0[lane] == 0.0 {
@@ -100,7 +104,7 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: b
             }
             write_row::<FMA, C, P>(
                 Row::new(row),
-                [M::LOBES, P - 2, if AMBIENT { C } else { 0 }],
+                [channels, M::LOBES, P - 2, ambient],
                 lane,
                 &outcome.point,
                 &solution,
@@ -118,8 +122,8 @@ struct Summary<const FMA: bool> {
 }
 
 #[inline(always)]
-fn summarise<M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool>(
-    problem: &Separable<'_, M, FMA, C, P, AMBIENT>,
+fn summarise<M: Model, const FMA: bool, const C: usize, const P: usize>(
+    problem: &Separable<'_, M, FMA, C, P>,
     solution: &Solution<FMA, C, P>,
 ) -> Summary<FMA> {
     let (zero, one) = (Lane::splat(0.0), Lane::splat(1.0));
@@ -137,7 +141,7 @@ fn summarise<M: Model, const FMA: bool, const C: usize, const P: usize, const AM
             chi2 = chi2 + observation.weight[k] * residual * residual;
         }
     }
-    let unknowns = P + M::LOBES + C * (1 + AMBIENT as usize);
+    let unknowns = P + M::LOBES + problem.channels * (1 + usize::from(problem.ambient));
     let freedom = (samples - Lane::splat(unknowns as f64)).max(one);
     Summary { chi2_reduced: chi2 / freedom, residual_rms: (squares / samples.max(one)).sqrt() }
 }
@@ -161,11 +165,7 @@ fn deviation<const FMA: bool>(variance: Lane<FMA>, birge: Lane<FMA>) -> Lane<FMA
 
 impl<const FMA: bool, const C: usize> Deviations<FMA, C> {
     #[inline(always)]
-    fn new<const P: usize, const AMBIENT: bool>(
-        lobes: usize,
-        solution: &Solution<FMA, C, P>,
-        chi2_reduced: Lane<FMA>,
-    ) -> Self {
+    fn new<const P: usize>(lobes: usize, solution: &Solution<FMA, C, P>, chi2_reduced: Lane<FMA>) -> Self {
         let zero = Lane::splat(0.0);
         let birge = chi2_reduced.max(Lane::splat(1.0));
         let mut hessian = solution.quadratic.hessian;
@@ -188,7 +188,7 @@ impl<const FMA: bool, const C: usize> Deviations<FMA, C> {
             result.shape_relative[i] =
                 Lane::select(variance.positive(), deviation(variance, birge), Lane::splat(f64::from(f32::INFINITY)));
         }
-        let variances = solution.magnitude_variances::<AMBIENT>(lobes, &covariance);
+        let variances = solution.magnitude_variances(lobes, &covariance);
         for k in 0..C {
             result.diffuse[k] = deviation(variances.diffuse[k], birge);
             result.ambient[k] = deviation(variances.ambient[k], birge);
@@ -203,7 +203,7 @@ impl<const FMA: bool, const C: usize> Deviations<FMA, C> {
 #[inline(always)]
 fn write_row<const FMA: bool, const C: usize, const P: usize>(
     mut row: Row,
-    [lobes, shapes, ambient]: [usize; 3],
+    [channels, lobes, shapes, ambient]: [usize; 4],
     lane: usize,
     point: &Point<FMA>,
     solution: &Solution<FMA, C, P>,
@@ -213,14 +213,14 @@ fn write_row<const FMA: bool, const C: usize, const P: usize>(
     let magnitudes = &solution.magnitudes;
     let shape: [f32; MAX_SHAPE] = array!(|i| point.shape_log[i].0[lane].exp());
     row.extend(point.normal.iter().map(|x| x.0[lane]));
-    row.extend(magnitudes.diffuse.iter().map(|x| x.0[lane]));
+    row.extend(magnitudes.diffuse[..channels].iter().map(|x| x.0[lane]));
     row.extend(magnitudes.specular[..lobes].iter().map(|x| x.0[lane]));
     row.extend(shape[..shapes].iter().copied());
     row.extend(magnitudes.ambient[..ambient].iter().map(|x| x.0[lane]));
     row.push(summary.chi2_reduced.0[lane]);
     row.push(summary.residual_rms.0[lane]);
     row.push(deviations.normal.0[lane]);
-    row.extend(deviations.diffuse.iter().map(|x| x.0[lane]));
+    row.extend(deviations.diffuse[..channels].iter().map(|x| x.0[lane]));
     row.extend(deviations.specular[..lobes].iter().map(|x| x.0[lane]));
     row.extend((0..shapes).map(|i| shape[i] * deviations.shape_relative[i].0[lane]));
     row.extend(deviations.ambient[..ambient].iter().map(|x| x.0[lane]));

@@ -3,7 +3,7 @@
 //! [Levenberg1944], [Marquardt1963]; damping scaled by the Hessian's diagonal. Each lane has its own damping and stops on its
 //! own; finished lanes keep their point while the others go on (repacking them gained nothing).
 
-use crate::lanes::{Lane, LaneMask};
+use crate::lanes::{Lane, LaneMask, outlined};
 use crate::number::{Mask, Number, Real};
 
 /// A cost, half its descent direction and the Gauss-Newton approximation of half its Hessian at a point.
@@ -63,6 +63,19 @@ const TOLERANCE: f64 = 1e-5;
 
 #[inline(always)]
 pub fn minimise<const FMA: bool, const P: usize, O: Objective<FMA, P>>(
+    objective: &mut O,
+    start: &O::Point,
+    wanted: LaneMask,
+    max_steps: usize,
+) -> Outcome<O::Point> {
+    outlined::<FMA, _>(
+        #[inline(always)]
+        || minimise_inline(objective, start, wanted, max_steps),
+    )
+}
+
+#[inline(always)]
+fn minimise_inline<const FMA: bool, const P: usize, O: Objective<FMA, P>>(
     objective: &mut O,
     start: &O::Point,
     wanted: LaneMask,

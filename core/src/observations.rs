@@ -23,6 +23,7 @@ pub struct Noise {
 pub struct Stack<'a> {
     pub samples: Samples<'a>,
     pub pixels: usize,
+    pub channels: usize,
     /// radiance = scale · sample + offset.
     pub scale: f32,
     pub offset: f32,
@@ -51,17 +52,17 @@ impl Stack<'_> {
     fn stored<const FMA: bool, const C: usize>(&self, light: usize, pixel: &[usize; LANES]) -> [Lane<FMA>; C] {
         let mut result = [Lane([0.0; LANES]); C];
         for i in 0..LANES {
-            let first = (light * self.pixels + pixel[i]) * C;
+            let first = (light * self.pixels + pixel[i]) * self.channels;
             match self.samples {
                 Samples::U16(values) => {
-                    let values = &values[first..first + C];
-                    for k in 0..C {
+                    let values = &values[first..first + self.channels];
+                    for k in 0..self.channels {
                         result[k].0[i] = f32::from(values[k]);
                     }
                 }
                 Samples::F32(values) => {
-                    let values = &values[first..first + C];
-                    for k in 0..C {
+                    let values = &values[first..first + self.channels];
+                    for k in 0..self.channels {
                         result[k].0[i] = values[k];
                     }
                 }
@@ -83,6 +84,8 @@ pub struct Observation<const FMA: bool, const C: usize> {
 
 /// Everything known of a group of eight pixels. The buffers are reused from group to group.
 pub struct Group<const FMA: bool, const C: usize> {
+    /// Channels that the stack has, at most C; the others have no weight.
+    pub channels: usize,
     pub observations: Vec<Observation<FMA, C>>,
     pub illuminations: Vec<Illumination<Lane<FMA>>>,
     /// Lights with at least one usable sample, per pixel.
@@ -96,6 +99,7 @@ impl<const FMA: bool, const C: usize> Group<FMA, C> {
         let zero = [Lane::splat(0.0); C];
         let observation = Observation { radiance: zero, weight: zero, irradiance: zero };
         let mut group = Group {
+            channels: stack.channels,
             observations: vec![observation; stack.lights.len()],
             illuminations: Vec::with_capacity(stack.lights.len()),
             usable_lights: Lane::splat(0.0),
@@ -113,8 +117,8 @@ impl<const FMA: bool, const C: usize> Group<FMA, C> {
         for (light, place) in stack.lights.iter().enumerate() {
             let (direction, falloff) = place.seen_from(x_mm, y_mm);
             self.illuminations.push(Illumination::new(direction, view));
-            for channel in 0..C {
-                let intensity = Lane([stack.intensity[light * C + channel]; LANES]);
+            for channel in 0..stack.channels {
+                let intensity = Lane([stack.intensity[light * stack.channels + channel]; LANES]);
                 self.observations[light].irradiance[channel] = intensity * falloff;
             }
         }
@@ -144,7 +148,7 @@ impl<const FMA: bool, const C: usize> Group<FMA, C> {
                 left_out = LaneMask(array!(|i| u32::from(mask[light * stack.pixels + pixel[i]] == 0).wrapping_sub(1)));
             }
             let mut any_usable = LaneMask::NONE;
-            for channel in 0..C {
+            for channel in 0..stack.channels {
                 let value = stored[channel].mul_add(scale, offset);
                 let missing = left_out | !value.abs().lt(Lane([f32::INFINITY; LANES]));
                 let clipped = !value.lt(Lane([stack.clip_level[channel]; LANES])) & !missing;

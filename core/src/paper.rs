@@ -67,8 +67,6 @@ pub struct PaperFit<'a, M, const FMA: bool, const C: usize> {
     stack: &'a Stack<'a>,
     sample: Sample,
     options: Options,
-    /// Whether the diffuse stage has the ambient term, as Phong's model does.
-    ambient: bool,
     colour: [Lane<FMA>; C],
     group: Group<FMA, C>,
     /// The group with the lights near the highlight left out.
@@ -82,15 +80,13 @@ pub struct PaperFit<'a, M, const FMA: bool, const C: usize> {
 impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
     /// Whether the procedure is defined for the model: one lobe of one shape parameter.
     pub const APPLIES: bool = M::LOBES == 1 && M::SHAPE.len() == 1;
-    pub const LAYOUT: Layout = Layout::paper(C);
 
-    pub fn new(stack: &'a Stack<'a>, colour: &[f64], sample: Sample, ambient: bool, options: Options) -> Self {
+    pub fn new(stack: &'a Stack<'a>, colour: &[f64], sample: Sample, options: Options) -> Self {
         PaperFit {
             stack,
             sample,
             options,
-            ambient,
-            colour: std::array::from_fn(|k| Lane::splat(colour[k])),
+            colour: std::array::from_fn(|k| Lane::splat(colour.get(k).copied().unwrap_or(0.0))),
             group: Group::new(stack),
             far: Group::new(stack),
             grey: Vec::with_capacity(stack.lights.len()),
@@ -139,10 +135,10 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
             normal: diffuse_normal(&self.grey, &self.far.illuminations, 1),
             shape_log: [Lane::splat(0.0); MAX_SHAPE],
         };
-        let unknowns = 3 + usize::from(self.ambient);
+        let unknowns = 3 + usize::from(self.options.ambient);
         let enough = !self.far.usable_lights.lt(Lane::splat(unknowns as f64));
-        let mut problem: Separable<'_, D, FMA, C, 2, false> =
-            Separable::new(&self.far, colour, self.options.optics, Loss::Linear, &mut self.diffuse_scratch);
+        let mut problem: Separable<'_, D, FMA, C, 2> =
+            Separable::new(&self.far, colour, self.options.optics, Loss::Linear, false, &mut self.diffuse_scratch);
         let outcome = minimise(&mut problem, &begin, enough, self.options.max_steps);
         let solution = problem.solve(&outcome.point);
         problem.give_back(&mut self.diffuse_scratch);
@@ -199,8 +195,8 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
             );
             problem.start_out_of_plane()
         };
-        let mut problem: Separable<'_, M, FMA, C, 3, false> =
-            Separable::new(&self.group, self.colour, self.options.optics, Loss::Linear, &mut self.scratch);
+        let mut problem: Separable<'_, M, FMA, C, 3> =
+            Separable::new(&self.group, self.colour, self.options.optics, Loss::Linear, false, &mut self.scratch);
         problem.fixed_specular = Some(specular);
         let outcome = minimise(&mut problem, &begin, diffuse.enough, self.options.max_steps);
         let solution = problem.solve(&outcome.point);
@@ -220,7 +216,8 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
 
     #[inline(always)]
     fn write(&self, diffuse: &Diffuse<FMA, C>, fitted: &Shape<FMA, C>, rows: &mut [f32], status: &mut [u8]) {
-        let width = Self::LAYOUT.width();
+        let channels = self.stack.channels;
+        let width = FitGroup::layout(self).width();
         let mut samples = Lane::splat(0.0);
         for observation in &self.group.observations {
             for k in 0..C {
@@ -250,15 +247,15 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
             let mut row = Row::new(row);
             if identified {
                 row.extend(fitted.normal.iter().map(|x| x.0[lane]));
-                row.extend(fitted.magnitude.iter().map(|x| x.0[lane]));
+                row.extend(fitted.magnitude[..channels].iter().map(|x| x.0[lane]));
                 row.push(self.sample.specular as f32);
                 row.push(fitted.shape_log.0[lane].exp());
             } else {
                 row.extend(diffuse.normal.iter().map(|x| x.0[lane]));
-                row.extend(diffuse.magnitude.iter().map(|x| x.0[lane]));
+                row.extend(diffuse.magnitude[..channels].iter().map(|x| x.0[lane]));
                 row.extend([f32::NAN, f32::NAN]);
             }
-            row.extend([diffuse.ambient.0[lane]; C]);
+            row.extend(std::iter::repeat_n(diffuse.ambient.0[lane], channels));
             row.push(if identified { rms.0[lane] } else { f32::NAN });
             row.push(if identified { fitted.view_tilt.0[lane] } else { f32::NAN });
         }
@@ -267,16 +264,16 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
 
 impl<M: Model, const FMA: bool, const C: usize> FitGroup for PaperFit<'_, M, FMA, C> {
     fn layout(&self) -> Layout {
-        Self::LAYOUT
+        Layout::paper(self.stack.channels)
     }
 
     #[inline(always)]
     fn fit_group(&mut self, first: usize, rows: &mut [f32], status: &mut [u8]) {
         self.group.gather(self.stack, first);
-        grey(&self.group.observations, &mut self.grey);
+        grey(&self.group, &mut self.grey);
         self.leave_out_highlight();
-        grey(&self.far.observations, &mut self.grey);
-        let diffuse = if self.ambient {
+        grey(&self.far, &mut self.grey);
+        let diffuse = if self.options.ambient {
             self.fit_diffuse::<UniformAmbient>([Lane::splat(1.0); C])
         } else {
             self.fit_diffuse::<Lambert>(self.colour)

@@ -137,7 +137,8 @@ fn fit<'py>(
     paper: Option<(f64, f64, bool)>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (name, ambient) = parse_model(model)?;
-    let options = Options { optics: parse_optics(index, fresnel)?, loss: parse_loss(loss, loss_scale)?, max_steps };
+    let optics = parse_optics(index, fresnel)?;
+    let options = Options { optics, loss: parse_loss(loss, loss_scale)?, max_steps, ambient };
     let as_u16 = radiance.extract::<PyReadonlyArray3<u16>>().ok();
     let as_f32 = radiance.extract::<PyReadonlyArray3<f32>>().ok();
     let (shape, samples) = match (&as_u16, &as_f32) {
@@ -146,8 +147,8 @@ fn fit<'py>(
         _ => return Err(invalid("radiance must be a uint16 or float32 array of shape (L, N, C)")),
     };
     let (lights, pixels, channels) = shape;
-    if channels != 1 && channels != 3 {
-        return Err(invalid(format!("radiance has {channels} channels, not 1 or 3")));
+    if !(1..=dispatch::MAX_CHANNELS).contains(&channels) {
+        return Err(invalid(format!("radiance has {channels} channels, not 1 to {}", dispatch::MAX_CHANNELS)));
     }
     let places = parse_places(&light_direction, &light_position_mm)?;
     check("light_direction", places.len(), lights)?;
@@ -161,6 +162,7 @@ fn fit<'py>(
     let stack = Stack {
         samples,
         pixels,
+        channels,
         scale,
         offset,
         lights: places,
@@ -183,10 +185,10 @@ fn fit<'py>(
     }
     let fitted = py
         .detach(|| match paper {
-            None => dispatch::fit(name, ambient, &stack, &light_rgb, options),
+            None => dispatch::fit(name, &stack, &light_rgb, options),
             Some((threshold, specular, refined)) => {
                 let sample = Sample { threshold, specular, refined };
-                dispatch::paper(name, ambient, &stack, &light_rgb, sample, options)
+                dispatch::paper(name, &stack, &light_rgb, sample, options)
             }
         })
         .ok_or_else(|| invalid(format!("the paper's procedure is not defined for {model}")))?;

@@ -40,12 +40,14 @@ pub struct Point<const FMA: bool> {
 }
 
 /// P is 2 + the number of shape parameters.
-pub struct Separable<'a, M, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool> {
+pub struct Separable<'a, M, const FMA: bool, const C: usize, const P: usize> {
     pub observations: &'a [Observation<FMA, C>],
     pub illuminations: &'a [Illumination<Lane<FMA>>],
     colour: [Lane<FMA>; C],
     optics: Optics,
     loss: Loss,
+    pub ambient: bool,
+    pub channels: usize,
     /// Specular magnitude where it is known beforehand, as one value for a whole sample.
     pub fixed_specular: Option<[Lane<FMA>; MAX_LOBES]>,
     /// Factor of each sample's weight from the robust loss, refreshed at every accepted point.
@@ -95,38 +97,32 @@ impl<const FMA: bool, const C: usize, const P: usize> Solution<FMA, C, P> {
     /// Marginal variances of the magnitudes, from the covariance of the nonlinear parameters: those of the linear problem
     /// at a known normal and shape, plus what follows from not knowing these.
     #[inline(always)]
-    pub fn magnitude_variances<const AMBIENT: bool>(
-        &self,
-        lobes: usize,
-        covariance: &[[Lane<FMA>; P]; P],
-    ) -> Magnitudes<FMA, C> {
+    pub fn magnitude_variances(&self, lobes: usize, covariance: &[[Lane<FMA>; P]; P]) -> Magnitudes<FMA, C> {
         let one = Lane::splat(1.0);
         let mut variances = Magnitudes::zero();
         for k in 0..C {
             let mut unit = Magnitudes::zero();
             unit.diffuse[k] = one;
-            variances.diffuse[k] = self.factored.solve::<AMBIENT>(&unit).diffuse[k]
+            variances.diffuse[k] = self.factored.solve(&unit).diffuse[k]
                 + propagated(array!(|p| self.following[p].diffuse[k]), covariance);
-            if AMBIENT {
+            if self.factored.ambient {
                 let mut unit = Magnitudes::zero();
                 unit.ambient[k] = one;
-                variances.ambient[k] = self.factored.solve::<AMBIENT>(&unit).ambient[k]
+                variances.ambient[k] = self.factored.solve(&unit).ambient[k]
                     + propagated(array!(|p| self.following[p].ambient[k]), covariance);
             }
         }
         for j in 0..lobes {
             let mut unit = Magnitudes::zero();
             unit.specular[j] = one;
-            variances.specular[j] = self.factored.solve::<AMBIENT>(&unit).specular[j]
+            variances.specular[j] = self.factored.solve(&unit).specular[j]
                 + propagated(array!(|p| self.following[p].specular[j]), covariance);
         }
         variances
     }
 }
 
-impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool>
-    Separable<'a, M, FMA, C, P, AMBIENT>
-{
+impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a, M, FMA, C, P> {
     /// The problem of one group, with buffers that `give_back` returns.
     #[inline(always)]
     pub fn new(
@@ -134,6 +130,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIEN
         colour: [Lane<FMA>; C],
         optics: Optics,
         loss: Loss,
+        ambient: bool,
         scratch: &mut Scratch<FMA, C, P>,
     ) -> Self {
         let mut robust = std::mem::take(&mut scratch.robust);
@@ -146,6 +143,8 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIEN
             colour,
             optics,
             loss,
+            ambient,
+            channels: group.channels,
             fixed_specular: None,
             robust,
             basis: std::mem::take(&mut scratch.basis),
@@ -217,7 +216,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIEN
         let zero = Lane::splat(0.0);
         let lobes = self.free_lobes();
 
-        let mut arrow = Arrow::zero();
+        let mut arrow = Arrow::new(self.ambient);
         for (light, observation) in self.observations.iter().enumerate() {
             let basis = &self.basis[light];
             let mut radiance = observation.radiance;
@@ -229,9 +228,9 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIEN
                 }
             }
             let specular = array!(|j| basis.specular[j].value);
-            arrow.add::<AMBIENT>(lobes, basis.diffuse.value, &specular, &radiance, &self.weight(light), &self.colour);
+            arrow.add(lobes, basis.diffuse.value, &specular, &radiance, &self.weight(light), &self.colour);
         }
-        let (mut magnitudes, factored) = arrow.magnitudes::<AMBIENT>(lobes);
+        let (mut magnitudes, factored) = arrow.magnitudes(lobes);
         if let Some(fixed) = self.fixed_specular {
             magnitudes.specular = fixed;
         }
@@ -247,7 +246,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIEN
             for k in 0..C {
                 let diffuse = magnitudes.diffuse[k];
                 let mut residual = observation.radiance[k];
-                if AMBIENT {
+                if self.ambient {
                     residual = residual - magnitudes.ambient[k];
                 }
                 residual = residual - diffuse * basis.diffuse.value;
@@ -266,7 +265,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIEN
                     weighted_slope[p] = weight[k] * slope[p];
                     quadratic.descent[p] = slope[p].mul_add(weighted_residual, quadratic.descent[p]);
                     projection[p].diffuse[k] = weighted_slope[p].mul_add(basis.diffuse.value, projection[p].diffuse[k]);
-                    if AMBIENT {
+                    if self.ambient {
                         projection[p].ambient[k] = projection[p].ambient[k] + weighted_slope[p];
                     }
                     if lobes > 0 {
@@ -290,7 +289,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIEN
         // What the magnitudes can absorb of a step is taken out of the Hessian.
         let mut following = [Magnitudes::zero(); P];
         for p in 0..P {
-            following[p] = factored.solve::<AMBIENT>(&projection[p]);
+            following[p] = factored.solve(&projection[p]);
         }
         for p in 0..P {
             // Rounding may leave less than nothing of a parameter that the magnitudes absorb whole.
@@ -365,7 +364,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIEN
             let (lower, upper) = Self::shape_bounds(i);
             bound = bound | !point.shape_log[i].gt(lower) | !point.shape_log[i].lt(upper);
         }
-        for k in 0..C {
+        for k in 0..self.channels {
             bound = bound | !magnitudes.diffuse[k].gt(zero);
         }
         for j in 0..M::LOBES {
@@ -375,9 +374,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIEN
     }
 }
 
-impl<M: Model, const FMA: bool, const C: usize, const P: usize, const AMBIENT: bool> Objective<FMA, P>
-    for Separable<'_, M, FMA, C, P, AMBIENT>
-{
+impl<M: Model, const FMA: bool, const C: usize, const P: usize> Objective<FMA, P> for Separable<'_, M, FMA, C, P> {
     type Point = Point<FMA>;
 
     #[inline(always)]

@@ -6,7 +6,7 @@ use crate::lanes::{Lane, outlined};
 use crate::minimise::solve_symmetric;
 use crate::models::{MAX_SHAPE, MAX_STARTS, Model, Optics};
 use crate::number::{Number, Real, array};
-use crate::observations::Observation;
+use crate::observations::Group;
 use crate::separable::{NORMAL_Z_MIN, Point};
 
 /// Mean over the channels of one light's samples, and the weight of that mean.
@@ -17,13 +17,13 @@ pub struct Grey<const FMA: bool> {
 }
 
 #[inline(always)]
-pub fn grey<const FMA: bool, const C: usize>(observations: &[Observation<FMA, C>], into: &mut Vec<Grey<FMA>>) {
+pub fn grey<const FMA: bool, const C: usize>(group: &Group<FMA, C>, into: &mut Vec<Grey<FMA>>) {
     into.clear();
-    let share = Lane::splat(1.0 / C as f64);
-    for observation in observations {
+    let share = Lane::splat(1.0 / group.channels as f64);
+    for observation in &group.observations {
         let mut radiance = Lane::splat(0.0);
         let mut variance = Lane::splat(0.0);
-        for k in 0..C {
+        for k in 0..group.channels {
             radiance = radiance + observation.radiance[k] * share;
             // A channel without weight makes the mean's variance infinite and its weight 0.
             variance = variance + share * share / observation.weight[k];
@@ -105,29 +105,31 @@ pub fn diffuse_normal<const FMA: bool>(
 
 /// The better of the candidate normals and the best shape of the model's grid for it.
 #[inline(always)]
-pub fn start<M: Model, const FMA: bool, const AMBIENT: bool>(
+pub fn start<M: Model, const FMA: bool>(
     grey: &[Grey<FMA>],
     illuminations: &[Illumination<Lane<FMA>>],
     optics: &Optics,
+    ambient: bool,
 ) -> Point<FMA> {
     outlined::<FMA, _>(
         #[inline(always)]
-        || start_inline::<M, FMA, AMBIENT>(grey, illuminations, optics),
+        || start_inline::<M, FMA>(grey, illuminations, optics, ambient),
     )
 }
 
 #[inline(always)]
-fn start_inline<M: Model, const FMA: bool, const AMBIENT: bool>(
+fn start_inline<M: Model, const FMA: bool>(
     grey: &[Grey<FMA>],
     illuminations: &[Illumination<Lane<FMA>>],
     optics: &Optics,
+    ambient: bool,
 ) -> Point<FMA> {
     let candidates = [diffuse_normal(grey, illuminations, 3), highlight_normal(grey, illuminations)];
     let mut best_cost = Lane::splat(f64::from(f32::MAX));
     let mut best = Point { normal: candidates[0], shape_log: [Lane::splat(0.0); MAX_SHAPE] };
     let one = [Lane::splat(1.0)];
     for normal in candidates {
-        let mut arrows = [Arrow::<FMA, 1>::zero(); MAX_STARTS];
+        let mut arrows = [Arrow::<FMA, 1>::new(ambient); MAX_STARTS];
         let mut data = Lane::splat(0.0);
         for (sample, at) in grey.iter().zip(illuminations) {
             let (radiance, weight) = ([sample.radiance], [sample.weight]);
@@ -135,12 +137,12 @@ fn start_inline<M: Model, const FMA: bool, const AMBIENT: bool>(
             for (arrow, shape) in arrows.iter_mut().zip(M::STARTS) {
                 let shape: [Lane<FMA>; MAX_SHAPE] = array!(|i| Lane::splat(shape[i]));
                 let basis = M::basis(normal, &shape[..M::SHAPE.len()], at, optics);
-                arrow.add::<AMBIENT>(M::LOBES, basis.diffuse, &basis.specular, &radiance, &weight, &one);
+                arrow.add(M::LOBES, basis.diffuse, &basis.specular, &radiance, &weight, &one);
             }
             data = (sample.weight * sample.radiance).mul_add(sample.radiance, data);
         }
         for (arrow, shape) in arrows.iter().zip(M::STARTS) {
-            let (magnitudes, _) = arrow.magnitudes::<AMBIENT>(M::LOBES);
+            let (magnitudes, _) = arrow.magnitudes(M::LOBES);
             let cost = data - magnitudes.dot(&arrow.right);
             let better = cost.lt(best_cost);
             best_cost = Lane::select(better, cost, best_cost);
