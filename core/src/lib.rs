@@ -1,5 +1,7 @@
 //! The numerical core of impasto: numbers in, numbers out. No files, and no Python types but in `python`.
 
+// Without Python nothing calls the core but its tests.
+#![cfg_attr(not(feature = "python"), allow(dead_code))]
 // Lanes and channels are walked by index side by side; zipped iterators hide that and vectorise worse.
 #![allow(clippy::needless_range_loop)]
 
