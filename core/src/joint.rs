@@ -1,13 +1,13 @@
 //! The joint fit: normal, shape and magnitudes of a pixel over all its lights at once.
 
 use crate::lanes::Lane;
-use crate::minimise::{inverse, minimise};
+use crate::minimise::{Objective, inverse, minimise};
 use crate::models::{MAX_LOBES, MAX_SHAPE, Model, Optics};
-use crate::number::{Number, Real, array};
+use crate::number::{Mask, Number, Real, array};
 use crate::observations::{Group, Stack};
 use crate::record::{FitGroup, Layout, Row, Status};
 use crate::separable::{Loss, Point, Scratch, Separable, Solution};
-use crate::start::{Grey, grey, start};
+use crate::start::{Grey, candidates, grey, start};
 use std::marker::PhantomData;
 
 #[derive(Clone, Copy, Debug)]
@@ -63,25 +63,39 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize> FitGroup for Joi
         self.group.gather(self.stack, first);
         grey(&self.group, &mut self.grey);
         let wanted = !self.group.usable_lights.lt(Lane::splat(self.unknowns() as f64));
-        let begin = start::<M, FMA>(&self.grey, &self.group.illuminations, &self.options.optics, self.options.ambient);
+        let illuminations = &self.group.illuminations;
+        let (optics, ambient) = (self.options.optics, self.options.ambient);
+        let begin =
+            start::<M, FMA>(&candidates(&self.grey, illuminations), &self.grey, illuminations, &optics, ambient);
 
         let mut problem = Separable::<M, FMA, C, P>::new(
             &self.group,
             self.colour,
-            self.options.optics,
+            optics,
             self.options.loss,
-            self.options.ambient,
+            ambient,
             &mut self.scratch,
         );
-        let outcome = minimise(&mut problem, &begin, wanted, self.options.max_steps);
-        let solution = problem.solve(&outcome.point);
+        let mut outcome = minimise(&mut problem, &begin, wanted, self.options.max_steps);
+        let mut solution = problem.solve(&outcome.point);
+        // A lobe of magnitude 0 gives its shape no gradient, so a fit that comes there cannot leave. From the normal that it
+        // found the grid of shapes may show a better lobe.
+        let trapped = wanted & !solution.magnitudes.specular[0].positive();
+        if M::LOBES > 0 && trapped.any() {
+            let again = start::<M, FMA>(&[outcome.point.normal], &self.grey, illuminations, &optics, ambient);
+            let retried = minimise(&mut problem, &again, trapped, self.options.max_steps);
+            let better = retried.cost.lt(solution.quadratic.cost) & trapped;
+            outcome.point = Separable::<M, FMA, C, P>::select(better, &retried.point, &outcome.point);
+            outcome.converged = (outcome.converged & !better) | (retried.converged & better);
+            solution = problem.solve(&outcome.point);
+        }
         let summary = summarise(&problem, &solution);
         let at_bound = problem.at_bound(&outcome.point, &solution.magnitudes);
         let deviations = Deviations::new::<P>(M::LOBES, &solution, summary.chi2_reduced);
         problem.give_back(&mut self.scratch);
 
         let channels = self.stack.channels;
-        let ambient = if self.options.ambient { channels } else { 0 };
+        let ambients = if ambient { channels } else { 0 };
         let width = FitGroup::layout(self).width();
         for (lane, status) in status.iter_mut().enumerate() {
             *status = if !wanted.holds(lane) {
@@ -104,7 +118,7 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize> FitGroup for Joi
             }
             write_row::<FMA, C, P>(
                 Row::new(row),
-                [channels, M::LOBES, P - 2, ambient],
+                [channels, M::LOBES, P - 2, ambients],
                 lane,
                 &outcome.point,
                 &solution,

@@ -51,8 +51,9 @@ pub trait Objective<const FMA: bool, const P: usize> {
     fn accepted(&mut self, _point: &Self::Point, _mask: LaneMask) {}
 }
 
-pub struct Outcome<Point> {
+pub struct Outcome<Point, const FMA: bool> {
     pub point: Point,
+    pub cost: Lane<FMA>,
     /// Lanes whose cost had stopped changing before the steps ran out.
     pub converged: LaneMask,
 }
@@ -67,7 +68,7 @@ pub fn minimise<const FMA: bool, const P: usize, O: Objective<FMA, P>>(
     start: &O::Point,
     wanted: LaneMask,
     max_steps: usize,
-) -> Outcome<O::Point> {
+) -> Outcome<O::Point, FMA> {
     outlined::<FMA, _>(
         #[inline(always)]
         || minimise_inline(objective, start, wanted, max_steps),
@@ -80,7 +81,7 @@ fn minimise_inline<const FMA: bool, const P: usize, O: Objective<FMA, P>>(
     start: &O::Point,
     wanted: LaneMask,
     max_steps: usize,
-) -> Outcome<O::Point> {
+) -> Outcome<O::Point, FMA> {
     let mut point = *start;
     let mut trial_point = *start;
     let mut current = Quadratic::zero();
@@ -107,7 +108,7 @@ fn minimise_inline<const FMA: bool, const P: usize, O: Objective<FMA, P>>(
         let blocked = objective.blocked(&point, &current.descent);
         trial_point = objective.moved(&point, &damped_step(&current, damping, &blocked));
     }
-    Outcome { point, converged: wanted & !active }
+    Outcome { point, cost: current.cost, converged: wanted & !active }
 }
 
 /// Solves (H + damping · diag H) step = descent by LDLᵀ, with blocked parameters held.

@@ -90,6 +90,8 @@ pub struct Group<const FMA: bool, const C: usize> {
     pub illuminations: Vec<Illumination<Lane<FMA>>>,
     /// Lights with at least one usable sample, per pixel.
     pub usable_lights: Lane<FMA>,
+    /// Usable samples of all channels, per pixel.
+    pub usable_samples: Lane<FMA>,
     /// Clipped samples, per pixel.
     pub clipped: Lane<FMA>,
 }
@@ -103,6 +105,7 @@ impl<const FMA: bool, const C: usize> Group<FMA, C> {
             observations: vec![observation; stack.lights.len()],
             illuminations: Vec::with_capacity(stack.lights.len()),
             usable_lights: Lane::splat(0.0),
+            usable_samples: Lane::splat(0.0),
             clipped: Lane::splat(0.0),
         };
         group.illuminate(stack, Lane::splat(0.0), Lane::splat(0.0));
@@ -140,6 +143,7 @@ impl<const FMA: bool, const C: usize> Group<FMA, C> {
         let relative_variance = Lane::splat(f64::from(stack.noise.relative).powi(2));
         let shadow_level = Lane([stack.shadow_level; LANES]);
         self.usable_lights = zero;
+        self.usable_samples = zero;
         self.clipped = zero;
         for (light, observation) in self.observations.iter_mut().enumerate() {
             let stored = stack.stored::<FMA, C>(light, &pixel);
@@ -160,6 +164,7 @@ impl<const FMA: bool, const C: usize> Group<FMA, C> {
                 observation.radiance[channel] = radiance / irradiance;
                 observation.weight[channel] = Lane::select(usable, irradiance * irradiance / variance, zero);
                 any_usable = any_usable | usable;
+                self.usable_samples = self.usable_samples + Lane::select(usable, one, zero);
                 self.clipped = self.clipped + Lane::select(clipped, one, zero);
             }
             self.usable_lights = self.usable_lights + Lane::select(any_usable, one, zero);

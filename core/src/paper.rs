@@ -163,7 +163,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
             self.options.optics,
         );
         let begin = problem.start();
-        let outcome: Outcome<Tilts<FMA>> = minimise(&mut problem, &begin, diffuse.enough, self.options.max_steps);
+        let outcome: Outcome<Tilts<FMA>, FMA> = minimise(&mut problem, &begin, diffuse.enough, self.options.max_steps);
         let normal = problem.normal(outcome.point.phi);
         // Ad cos φn is what the diffuse stage saw, as its φn was 0.
         let in_plane = (normal[0] * normal[0] + normal[2] * normal[2]).sqrt();

@@ -103,9 +103,19 @@ pub fn diffuse_normal<const FMA: bool>(
     normal
 }
 
-/// The better of the candidate normals and the best shape of the model's grid for it.
+/// Two normals that the fit may start from: where the diffuse light puts it, and where the highlight does.
+#[inline(always)]
+pub fn candidates<const FMA: bool>(
+    grey: &[Grey<FMA>],
+    illuminations: &[Illumination<Lane<FMA>>],
+) -> [[Lane<FMA>; 3]; 2] {
+    [diffuse_normal(grey, illuminations, 3), highlight_normal(grey, illuminations)]
+}
+
+/// The best shape of the model's grid at the best of the candidate normals.
 #[inline(always)]
 pub fn start<M: Model, const FMA: bool>(
+    candidates: &[[Lane<FMA>; 3]],
     grey: &[Grey<FMA>],
     illuminations: &[Illumination<Lane<FMA>>],
     optics: &Optics,
@@ -113,46 +123,131 @@ pub fn start<M: Model, const FMA: bool>(
 ) -> Point<FMA> {
     outlined::<FMA, _>(
         #[inline(always)]
-        || start_inline::<M, FMA>(grey, illuminations, optics, ambient),
+        || start_inline::<M, FMA>(candidates, grey, illuminations, optics, ambient),
     )
+}
+
+/// Weighted sums for radiance = b · l + Ae + As · lobe, where the lobe belongs to a candidate normal and b is free.
+///
+/// To leave the diffuse normal b free costs nothing, for it is linear, and it keeps a broad lobe apart from a tilt of the
+/// diffuse term that a candidate normal slightly off would otherwise pay for with a negative lobe.
+#[derive(Clone, Copy)]
+struct FreeDiffuse<const FMA: bool> {
+    /// Of (l, 1) with itself; the row of 1 is 0 without ambient term.
+    matrix: [[Lane<FMA>; 4]; 4],
+    right: [Lane<FMA>; 4],
+    data: Lane<FMA>,
+}
+
+#[derive(Clone, Copy)]
+struct LobeSums<const FMA: bool> {
+    cross: [Lane<FMA>; 4],
+    square: Lane<FMA>,
+    right: Lane<FMA>,
 }
 
 #[inline(always)]
 fn start_inline<M: Model, const FMA: bool>(
+    candidates: &[[Lane<FMA>; 3]],
     grey: &[Grey<FMA>],
     illuminations: &[Illumination<Lane<FMA>>],
     optics: &Optics,
     ambient: bool,
 ) -> Point<FMA> {
-    let candidates = [diffuse_normal(grey, illuminations, 3), highlight_normal(grey, illuminations)];
+    let zero = Lane::splat(0.0);
+    let one = Lane::splat(if ambient { 1.0 } else { 0.0 });
     let mut best_cost = Lane::splat(f64::from(f32::MAX));
-    let mut best = Point { normal: candidates[0], shape_log: [Lane::splat(0.0); MAX_SHAPE] };
-    let one = [Lane::splat(1.0)];
-    for normal in candidates {
-        let mut arrows = [Arrow::<FMA, 1>::new(ambient); MAX_STARTS];
-        let mut data = Lane::splat(0.0);
+    let mut best = Point { normal: candidates[0], shape_log: [zero; MAX_SHAPE] };
+    let mut free_normal = candidates[0];
+    for &normal in candidates {
+        let mut sums = FreeDiffuse { matrix: [[zero; 4]; 4], right: [zero; 4], data: zero };
+        let mut lobes = [LobeSums { cross: [zero; 4], square: zero, right: zero }; MAX_STARTS];
         for (sample, at) in grey.iter().zip(illuminations) {
-            let (radiance, weight) = ([sample.radiance], [sample.weight]);
-            // The inner loop is over the shapes, so that what depends on the directions alone is computed once.
-            for (arrow, shape) in arrows.iter_mut().zip(M::STARTS) {
-                let shape: [Lane<FMA>; MAX_SHAPE] = array!(|i| Lane::splat(shape[i]));
-                let basis = M::basis(normal, &shape[..M::SHAPE.len()], at, optics);
-                arrow.add(M::LOBES, basis.diffuse, &basis.specular, &radiance, &weight, &one);
+            sums.data = (sample.weight * sample.radiance).mul_add(sample.radiance, sums.data);
+            let weight = Lane::select(dot(normal, at.light).positive(), sample.weight, zero);
+            let column = [at.light[0], at.light[1], at.light[2], one];
+            let weighted: [Lane<FMA>; 4] = array!(|i| weight * column[i]);
+            for i in 0..4 {
+                sums.right[i] = weighted[i].mul_add(sample.radiance, sums.right[i]);
+                for j in i..4 {
+                    sums.matrix[i][j] = weighted[i].mul_add(column[j], sums.matrix[i][j]);
+                }
             }
-            data = (sample.weight * sample.radiance).mul_add(sample.radiance, data);
+            // The inner loop is over the shapes, so that what depends on the directions alone is computed once.
+            for (lobe, shape) in lobes.iter_mut().zip(M::STARTS) {
+                let shape: [Lane<FMA>; MAX_SHAPE] = array!(|i| Lane::splat(shape[i]));
+                let value = M::basis(normal, &shape[..M::SHAPE.len()], at, optics).specular[0];
+                for i in 0..4 {
+                    lobe.cross[i] = weighted[i].mul_add(value, lobe.cross[i]);
+                }
+                let weighted = weight * value;
+                lobe.square = weighted.mul_add(value, lobe.square);
+                lobe.right = weighted.mul_add(sample.radiance, lobe.right);
+            }
         }
-        for (arrow, shape) in arrows.iter().zip(M::STARTS) {
-            let (magnitudes, _) = arrow.magnitudes(M::LOBES);
-            let cost = data - magnitudes.dot(&arrow.right);
+        // Lights in one plane leave the third direction undetermined: a little ridge makes it 0.
+        let ridge = (sums.matrix[0][0] + sums.matrix[1][1] + sums.matrix[2][2]) * Lane::splat(1e-6);
+        for i in 0..3 {
+            sums.matrix[i][i] = sums.matrix[i][i] + ridge;
+        }
+        let diffuse = solve_symmetric(sums.matrix, sums.right);
+        let base = sums.data - product(&diffuse, &sums.right);
+        for (lobe, shape) in lobes.iter().zip(M::STARTS) {
+            let absorbed = solve_symmetric(sums.matrix, lobe.cross);
+            let square = (lobe.square - product(&absorbed, &lobe.cross)).max(lobe.square * Lane::splat(1e-5));
+            let magnitude = (lobe.right - product(&absorbed, &sums.right)).max(zero) / square.max(Lane::splat(1e-30));
+            let cost = base - magnitude * magnitude * square;
             let better = cost.lt(best_cost);
             best_cost = Lane::select(better, cost, best_cost);
             for i in 0..3 {
                 best.normal[i] = Lane::select(better, normal[i], best.normal[i]);
+                let free = diffuse[i] - magnitude * absorbed[i];
+                free_normal[i] = Lane::select(better, free, free_normal[i]);
             }
             for i in 0..M::SHAPE.len() {
                 best.shape_log[i] = Lane::select(better, Lane::splat(shape[i].ln()), best.shape_log[i]);
             }
         }
     }
+    // The lobe's normal or the diffuse term's: whichever serves both better.
+    let free_normal = bounded(free_normal);
+    let costs = [
+        one_normal_cost::<M, FMA>(best.normal, &best.shape_log, grey, illuminations, optics, ambient),
+        one_normal_cost::<M, FMA>(free_normal, &best.shape_log, grey, illuminations, optics, ambient),
+    ];
+    let better = costs[1].lt(costs[0]);
+    best.normal = array!(|i| Lane::select(better, free_normal[i], best.normal[i]));
     best
+}
+
+#[inline(always)]
+fn product<const FMA: bool, const N: usize>(a: &[Lane<FMA>; N], b: &[Lane<FMA>; N]) -> Lane<FMA> {
+    let mut sum = Lane::splat(0.0);
+    for i in 0..N {
+        sum = a[i].mul_add(b[i], sum);
+    }
+    sum
+}
+
+/// Least cost of a normal and a shape over all magnitudes that are not negative.
+#[inline(always)]
+fn one_normal_cost<M: Model, const FMA: bool>(
+    normal: [Lane<FMA>; 3],
+    shape_log: &[Lane<FMA>; MAX_SHAPE],
+    grey: &[Grey<FMA>],
+    illuminations: &[Illumination<Lane<FMA>>],
+    optics: &Optics,
+    ambient: bool,
+) -> Lane<FMA> {
+    let one = [Lane::splat(1.0)];
+    let shape: [Lane<FMA>; MAX_SHAPE] = array!(|i| shape_log[i].exp());
+    let mut arrow = Arrow::<FMA, 1>::new(ambient);
+    let mut data = Lane::splat(0.0);
+    for (sample, at) in grey.iter().zip(illuminations) {
+        let (radiance, weight) = ([sample.radiance], [sample.weight]);
+        let basis = M::basis(normal, &shape[..M::SHAPE.len()], at, optics);
+        arrow.add(M::LOBES, basis.diffuse, &basis.specular, &radiance, &weight, &one);
+        data = (sample.weight * sample.radiance).mul_add(sample.radiance, data);
+    }
+    data - arrow.magnitudes(M::LOBES).0.dot(&arrow.right)
 }

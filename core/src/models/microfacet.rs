@@ -24,6 +24,7 @@ impl Distribution for TrowbridgeReitz {
         name: "c",
         lower: 0.004,
         upper: 1.0,
+        prior: (0.15, 1.2),
         meaning: "eccentricity of the facets' ellipsoids, small is glossy",
     };
     const TITLE: &'static str = "Trowbridge-Reitz facets";
@@ -58,6 +59,7 @@ impl Distribution for Gaussian {
         name: "m",
         lower: 0.004,
         upper: 2.0,
+        prior: (0.2, 1.2),
         meaning: "width of the distribution of facet angles in radians",
     };
     const TITLE: &'static str = "Gaussian facets";

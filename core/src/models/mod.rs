@@ -52,6 +52,9 @@ pub struct ShapeParameter {
     pub name: &'static str,
     pub lower: f64,
     pub upper: f64,
+    /// Where the parameter is taken to be as long as the photographs do not tell: median and standard deviation of its
+    /// logarithm.
+    pub prior: (f64, f64),
     pub meaning: &'static str,
 }
 

@@ -13,6 +13,7 @@ impl Model for Phong {
         name: "shininess",
         lower: 0.2,
         upper: 20_000.0,
+        prior: (40.0, 2.4),
         meaning: "exponent of cos of the angle from the mirror direction",
     }];
     const LOBES: usize = 1;
