@@ -60,7 +60,7 @@ pub struct Outcome<Point, const FMA: bool> {
 
 /// Relative change of the cost below which a lane has converged, whichever its sign: in f32 the last step is often rejected
 /// by rounding alone.
-const TOLERANCE: f64 = 1e-5;
+const TOLERANCE: f64 = 3e-5;
 
 #[inline(always)]
 pub fn minimise<const FMA: bool, const P: usize, O: Objective<FMA, P>>(
@@ -86,27 +86,35 @@ fn minimise_inline<const FMA: bool, const P: usize, O: Objective<FMA, P>>(
     let mut trial_point = *start;
     let mut current = Quadratic::zero();
     current.cost = Lane::splat(f64::from(f32::MAX));
-    let mut damping = Lane::splat(1e-2);
+    let mut damping = Lane::splat(1e-3);
     let mut active = wanted;
     // The start itself is the first trial, which every lane accepts.
     for _ in 0..=max_steps {
         let trial = objective.quadratic(&trial_point);
         let better = trial.cost.lt(current.cost) & active;
         let settled = (trial.cost - current.cost).abs().lt(current.cost * Lane::splat(TOLERANCE));
-        damping = damping * Lane::select(better, Lane::splat(0.1), Lane::splat(8.0));
-        damping = damping.max(Lane::splat(1e-7));
+        let raised = (damping * Lane::splat(8.0)).max(Lane::splat(0.1));
+        let lowered = (damping * Lane::splat(0.1)).max(Lane::splat(1e-7));
+        damping = Lane::select(better, lowered, raised);
 
         point = O::select(better, &trial_point, &point);
         current = Quadratic::select(better, &trial, &current);
         objective.accepted(&point, better);
         // Damping beyond this bound means that no step, however short, lowers the cost: a kink or a flat valley.
         let stuck = damping.gt(Lane::splat(1e7));
-        active = active & !(settled | stuck);
+        let blocked = objective.blocked(&point, &current.descent);
+        let step = damped_step(&current, damping, &blocked);
+        // To first order the step lowers the cost by twice this, to second order by this: too little to be worth a look.
+        let mut promised = Lane::splat(0.0);
+        for i in 0..P {
+            promised = step[i].mul_add(current.descent[i], promised);
+        }
+        let vain = promised.lt(current.cost * Lane::splat(TOLERANCE));
+        active = active & !(settled | stuck | vain);
         if !active.any() {
             break;
         }
-        let blocked = objective.blocked(&point, &current.descent);
-        trial_point = objective.moved(&point, &damped_step(&current, damping, &blocked));
+        trial_point = objective.moved(&point, &step);
     }
     Outcome { point, cost: current.cost, converged: wanted & !active }
 }
