@@ -12,7 +12,7 @@ use crate::minimise::{Objective, Outcome, minimise};
 use crate::models::{Basis, Lambert, MAX_SHAPE, Model, Optics, ShapeParameter};
 use crate::number::{Number, Real, array};
 use crate::observations::{Group, Stack};
-use crate::paper_shape::{ShapeFit, Tilts};
+use crate::paper_shape::{Remainder, ShapeFit, Tilts};
 use crate::record::{FitGroup, Layout, Row, Status};
 use crate::separable::{Loss, Point, Scratch, Separable};
 use crate::start::{Grey, diffuse_normal, grey};
@@ -72,6 +72,7 @@ pub struct PaperFit<'a, M, const FMA: bool, const C: usize> {
     /// The group with the lights near the highlight left out.
     far: Group<FMA, C>,
     grey: Vec<Grey<FMA>>,
+    remainders: Vec<Remainder<FMA>>,
     diffuse_scratch: Scratch<FMA, C, 2>,
     scratch: Scratch<FMA, C, 3>,
     model: PhantomData<M>,
@@ -90,6 +91,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
             group: Group::new(stack),
             far: Group::new(stack),
             grey: Vec::with_capacity(stack.lights.len()),
+            remainders: Vec::with_capacity(stack.lights.len()),
             diffuse_scratch: Scratch::new(stack.lights.len()),
             scratch: Scratch::new(stack.lights.len()),
             model: PhantomData,
@@ -154,13 +156,14 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
     /// Step 5, literally.
     #[inline(always)]
     fn fit_shape(&mut self, diffuse: &Diffuse<FMA, C>) -> Shape<FMA, C> {
-        let mut problem = ShapeFit::<M, FMA, C>::new(
+        let mut problem = ShapeFit::<M, FMA>::new(
             &self.group,
             diffuse.normal,
             diffuse.magnitude,
             self.colour,
             Lane::splat(self.sample.specular),
             self.options.optics,
+            &mut self.remainders,
         );
         let begin = problem.start();
         let outcome: Outcome<Tilts<FMA>, FMA> = minimise(&mut problem, &begin, diffuse.enough, self.options.max_steps);
@@ -185,13 +188,14 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
         let optics = self.options.optics;
         let specular = [Lane::splat(self.sample.specular), Lane::splat(0.0)];
         let begin = {
-            let problem = ShapeFit::<M, FMA, C>::new(
+            let problem = ShapeFit::<M, FMA>::new(
                 &self.group,
                 diffuse.normal,
                 diffuse.magnitude,
                 self.colour,
                 specular[0],
                 optics,
+                &mut self.remainders,
             );
             problem.start_out_of_plane()
         };

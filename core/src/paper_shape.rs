@@ -7,7 +7,7 @@ use crate::dual::Dual;
 use crate::geometry::{Illumination, dot, normalise};
 use crate::lanes::{Lane, LaneMask, outlined};
 use crate::minimise::{Objective, Quadratic};
-use crate::models::{MAX_SHAPE, Model, Optics};
+use crate::models::{MAX_SHAPE, MAX_STARTS, Model, Optics};
 use crate::number::{Number, Real, array};
 use crate::observations::Group;
 use crate::separable::Point;
@@ -27,11 +27,22 @@ pub struct Tilts<const FMA: bool> {
     pub phi: Lane<FMA>,
 }
 
-pub struct ShapeFit<'a, M, const FMA: bool, const C: usize> {
-    group: &'a Group<FMA, C>,
+/// What the diffuse term leaves of one light's samples, all channels in one.
+///
+/// The lobe reaches channel k as As s_k times its value, s the light's colour: of the channels' residuals only their
+/// projection on s depends on the lobe, and that is one number with one weight.
+#[derive(Clone, Copy)]
+pub struct Remainder<const FMA: bool> {
+    value: Lane<FMA>,
+    weight: Lane<FMA>,
+}
+
+pub struct ShapeFit<'a, M, const FMA: bool> {
+    illuminations: &'a [Illumination<Lane<FMA>>],
+    remainders: &'a [Remainder<FMA>],
+    /// The part of the cost that no lobe changes.
+    constant: Lane<FMA>,
     normal: [Lane<FMA>; 3],
-    magnitude: [Lane<FMA>; C],
-    colour: [Lane<FMA>; C],
     specular: Lane<FMA>,
     optics: Optics,
     /// θv and φv as calibrated.
@@ -46,20 +57,48 @@ fn rotated<R: Real>(normal: [R; 3], sine: R, cosine: R) -> [R; 3] {
     [cosine * normal[0] / in_plane, sine, cosine * normal[2] / in_plane]
 }
 
-impl<'a, M: Model, const FMA: bool, const C: usize> ShapeFit<'a, M, FMA, C> {
+impl<'a, M: Model, const FMA: bool> ShapeFit<'a, M, FMA> {
+    /// `magnitude` is the diffuse stage's; the diffuse term keeps the normal of that stage.
     #[inline(always)]
-    pub fn new(
+    pub fn new<const C: usize>(
         group: &'a Group<FMA, C>,
         normal: [Lane<FMA>; 3],
         magnitude: [Lane<FMA>; C],
         colour: [Lane<FMA>; C],
         specular: Lane<FMA>,
         optics: Optics,
+        remainders: &'a mut Vec<Remainder<FMA>>,
     ) -> Self {
+        let zero = Lane::splat(0.0);
+        let mut constant = zero;
+        remainders.clear();
+        for (observation, at) in group.observations.iter().zip(&group.illuminations) {
+            let cosine = dot(normal, at.light).max(zero);
+            let (mut weight, mut projected, mut squares) = (zero, zero, zero);
+            for k in 0..C {
+                let left = observation.radiance[k] - magnitude[k] * cosine;
+                let coloured = observation.weight[k] * colour[k];
+                weight = coloured.mul_add(colour[k], weight);
+                projected = coloured.mul_add(left, projected);
+                squares = (observation.weight[k] * left).mul_add(left, squares);
+            }
+            let value = Lane::select(weight.positive(), projected / weight, zero);
+            constant = constant + squares - value * projected;
+            remainders.push(Remainder { value, weight });
+        }
         let view = group.illuminations[0].view;
         let theta = Lane(array!(|i| view[0].0[i].atan2(view[2].0[i])));
         let phi = Lane(array!(|i| view[1].0[i].asin()));
-        ShapeFit { group, normal, magnitude, colour, specular, optics, view: (theta, phi), model: PhantomData }
+        ShapeFit {
+            illuminations: &group.illuminations,
+            remainders,
+            constant: constant.max(zero),
+            normal,
+            specular,
+            optics,
+            view: (theta, phi),
+            model: PhantomData,
+        }
     }
 
     #[inline(always)]
@@ -68,67 +107,54 @@ impl<'a, M: Model, const FMA: bool, const C: usize> ShapeFit<'a, M, FMA, C> {
         rotated(self.normal, sine, cosine)
     }
 
-    /// The lobe at one light for a view tilted by θv in the arm's plane.
+    /// The shape of the grid and the tilt out of the plane, of `tilts`, that fit best, seen from `view`.
     #[inline(always)]
-    fn lobe(&self, normal: [Lane<FMA>; 3], shape: Lane<FMA>, light: usize, theta_v: Lane<FMA>) -> Lane<FMA> {
-        let (sine, cosine) = sine_cosine(theta_v);
-        let view = [sine, Lane::splat(0.0), cosine];
-        let at = Illumination::new(self.group.illuminations[light].light, view);
-        let basis = M::basis(normal, &[shape], &at, &self.optics);
-        basis.specular[0]
-    }
-
-    /// What the diffuse term leaves of each channel; the diffuse term keeps the normal of its own fit.
-    #[inline(always)]
-    fn remainder(&self, light: usize) -> [Lane<FMA>; C] {
-        let observation = &self.group.observations[light];
-        let at = &self.group.illuminations[light];
-        let cosine = dot(self.normal, at.light).max(Lane::splat(0.0));
-        array!(|k| observation.radiance[k] - self.magnitude[k] * cosine)
-    }
-
-    #[inline(always)]
-    fn cost(&self, normal: [Lane<FMA>; 3], shape: Lane<FMA>, calibrated: bool) -> Lane<FMA> {
+    fn search(&self, view: Option<[Lane<FMA>; 3]>, tilts: [Lane<FMA>; PHI_STARTS.len()]) -> (Lane<FMA>, Lane<FMA>) {
         outlined::<FMA, _>(
             #[inline(always)]
-            || self.cost_inline(normal, shape, calibrated),
+            || self.search_inline(view, tilts),
         )
     }
 
     #[inline(always)]
-    fn cost_inline(&self, normal: [Lane<FMA>; 3], shape: Lane<FMA>, calibrated: bool) -> Lane<FMA> {
-        let mut cost = Lane::splat(0.0);
-        for light in 0..self.group.observations.len() {
-            let lobe = if calibrated {
-                M::basis(normal, &[shape], &self.group.illuminations[light], &self.optics).specular[0]
-            } else {
-                self.lobe(normal, shape, light, self.view.0)
-            };
-            let remainder = self.remainder(light);
-            for k in 0..C {
-                let residual = remainder[k] - self.colour[k] * self.specular * lobe;
-                cost = (self.group.observations[light].weight[k] * residual).mul_add(residual, cost);
+    fn search_inline(
+        &self,
+        view: Option<[Lane<FMA>; 3]>,
+        tilts: [Lane<FMA>; PHI_STARTS.len()],
+    ) -> (Lane<FMA>, Lane<FMA>) {
+        let mut best_cost = Lane::splat(f64::from(f32::MAX));
+        let mut best = (Lane::splat(M::STARTS[0][0].ln()), tilts[0]);
+        for tilt in tilts {
+            let normal = self.normal(tilt);
+            let mut costs = [Lane::splat(0.0); MAX_STARTS];
+            for (remainder, calibrated) in self.remainders.iter().zip(self.illuminations) {
+                let mut at = *calibrated;
+                if let Some(view) = view {
+                    at = Illumination::new(at.light, view);
+                }
+                for (cost, shape) in costs.iter_mut().zip(M::STARTS) {
+                    let lobe = M::basis(normal, &[Lane::splat(shape[0])], &at, &self.optics).specular[0];
+                    let residual = remainder.value - self.specular * lobe;
+                    *cost = (remainder.weight * residual).mul_add(residual, *cost);
+                }
+            }
+            for (cost, shape) in costs.iter().zip(M::STARTS) {
+                let better = cost.lt(best_cost);
+                best_cost = Lane::select(better, *cost, best_cost);
+                best.0 = Lane::select(better, Lane::splat(shape[0].ln()), best.0);
+                best.1 = Lane::select(better, tilt, best.1);
             }
         }
-        cost
+        best
     }
 
     /// The best of a grid of shapes and φn, with θv as calibrated.
     #[inline(always)]
     pub fn start(&self) -> Tilts<FMA> {
-        let mut best_cost = Lane::splat(f64::from(f32::MAX));
-        let mut best = Tilts { view: self.view.0, shape_log: Lane::splat(0.0), phi: Lane::splat(0.0) };
-        for phi in PHI_STARTS {
-            let normal = self.normal(Lane::splat(phi));
-            for shape in M::STARTS {
-                let cost = self.cost(normal, Lane::splat(shape[0]), false);
-                let better = cost.lt(best_cost);
-                best_cost = Lane::select(better, cost, best_cost);
-                best.shape_log = Lane::select(better, Lane::splat(shape[0].ln()), best.shape_log);
-                best.phi = Lane::select(better, Lane::splat(phi), best.phi);
-            }
-        }
-        best
+        let (sine, cosine) = sine_cosine(self.view.0);
+        let (shape_log, phi) =
+            self.search(Some([sine, Lane::splat(0.0), cosine]), array!(|i| Lane::splat(PHI_STARTS[i])));
+        Tilts { view: self.view.0, shape_log, phi }
     }
 
     /// The same grid for the calibrated view. The highlight lies at φn = φv/2; its height does not tell on which side of it
@@ -137,22 +163,18 @@ impl<'a, M: Model, const FMA: bool, const C: usize> ShapeFit<'a, M, FMA, C> {
     pub fn start_out_of_plane(&self) -> Point<FMA> {
         let half = self.view.1 * Lane::splat(0.5);
         let away = Lane::select(half.lt(Lane::splat(0.0)), Lane::splat(1.0), Lane::splat(-1.0));
-        let mut best_cost = Lane::splat(f64::from(f32::MAX));
-        let mut best = Point { normal: self.normal, shape_log: [Lane::splat(0.0); MAX_SHAPE] };
-        for offset in PHI_STARTS {
-            let normal = self.normal(half + away * Lane::splat(offset));
-            for shape in M::STARTS {
-                let cost = self.cost(normal, Lane::splat(shape[0]), true);
-                let better = cost.lt(best_cost);
-                best_cost = Lane::select(better, cost, best_cost);
-                best.shape_log[0] = Lane::select(better, Lane::splat(shape[0].ln()), best.shape_log[0]);
-                for i in 0..3 {
-                    best.normal[i] = Lane::select(better, normal[i], best.normal[i]);
-                }
-            }
-        }
-        best.normal = normalise(best.normal);
-        best
+        let (shape, phi) = self.search(None, array!(|i| half + away * Lane::splat(PHI_STARTS[i])));
+        let mut shape_log = [Lane::splat(0.0); MAX_SHAPE];
+        shape_log[0] = shape;
+        Point { normal: normalise(self.normal(phi)), shape_log }
+    }
+
+    /// The lobe at one light for a view tilted by θv in the arm's plane.
+    #[inline(always)]
+    fn lobe(&self, normal: [Lane<FMA>; 3], shape: Lane<FMA>, light: usize, theta_v: Lane<FMA>) -> Lane<FMA> {
+        let (sine, cosine) = sine_cosine(theta_v);
+        let at = Illumination::new(self.illuminations[light].light, [sine, Lane::splat(0.0), cosine]);
+        M::basis(normal, &[shape], &at, &self.optics).specular[0]
     }
 
     #[inline(always)]
@@ -170,24 +192,20 @@ impl<'a, M: Model, const FMA: bool, const C: usize> ShapeFit<'a, M, FMA, C> {
         let per_step = Lane::splat(0.5) / step;
 
         let mut quadratic = Quadratic::zero();
-        for light in 0..self.group.observations.len() {
-            let at = Illumination::new(self.group.illuminations[light].light, view);
+        quadratic.cost = self.constant;
+        for (light, remainder) in self.remainders.iter().enumerate() {
+            let at = Illumination::new(self.illuminations[light].light, view);
             let lobe = M::basis(dual_normal, &[dual_shape], &at, &self.optics).specular[0];
             let ahead = self.lobe(normal, shape, light, point.view + step);
             let behind = self.lobe(normal, shape, light, point.view - step);
             let slopes = [(ahead - behind) * per_step, lobe.derivative[0], lobe.derivative[1]];
-            let remainder = self.remainder(light);
-            for k in 0..C {
-                let weight = self.group.observations[light].weight[k];
-                let scale = self.colour[k] * self.specular;
-                let residual = remainder[k] - scale * lobe.value;
-                quadratic.cost = (weight * residual).mul_add(residual, quadratic.cost);
-                for p in 0..3 {
-                    let weighted = weight * scale * slopes[p];
-                    quadratic.descent[p] = weighted.mul_add(residual, quadratic.descent[p]);
-                    for q in p..3 {
-                        quadratic.hessian[p][q] = (weighted * scale).mul_add(slopes[q], quadratic.hessian[p][q]);
-                    }
+            let residual = remainder.value - self.specular * lobe.value;
+            quadratic.cost = (remainder.weight * residual).mul_add(residual, quadratic.cost);
+            for p in 0..3 {
+                let weighted = remainder.weight * self.specular * slopes[p];
+                quadratic.descent[p] = weighted.mul_add(residual, quadratic.descent[p]);
+                for q in p..3 {
+                    quadratic.hessian[p][q] = (weighted * self.specular).mul_add(slopes[q], quadratic.hessian[p][q]);
                 }
             }
         }
@@ -222,7 +240,7 @@ fn sine_cosine<R: Real>(angle: R) -> (R, R) {
     (angle * sine, cosine)
 }
 
-impl<M: Model, const FMA: bool, const C: usize> Objective<FMA, 3> for ShapeFit<'_, M, FMA, C> {
+impl<M: Model, const FMA: bool> Objective<FMA, 3> for ShapeFit<'_, M, FMA> {
     type Point = Tilts<FMA>;
 
     #[inline(always)]

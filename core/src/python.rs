@@ -9,7 +9,7 @@ use crate::paper::Sample;
 use crate::record::Layout;
 use crate::render::{Parameters, View};
 use crate::separable::Loss;
-use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice};
@@ -217,8 +217,8 @@ fn into_dict(py: Python<'_>, layout: Layout, rows: Vec<f32>, status: Vec<u8>) ->
 
 /// Renders a tile under each light; see `impasto.render`.
 #[pyfunction]
-#[pyo3(signature = (model, normal, diffuse, specular, shape, ambient, *, light_direction, light_position_mm,
-    light_intensity, view_direction, camera_distance_mm, position_mm, light_rgb, index, fresnel))]
+#[pyo3(signature = (model, normal, diffuse, specular, shape, ambient, *, view_tilt=None, light_direction,
+    light_position_mm, light_intensity, view_direction, camera_distance_mm, position_mm, light_rgb, index, fresnel))]
 #[allow(clippy::too_many_arguments)]
 fn render<'py>(
     py: Python<'py>,
@@ -228,6 +228,7 @@ fn render<'py>(
     specular: PyReadonlyArray2<f32>,
     shape: PyReadonlyArray2<f32>,
     ambient: Option<PyReadonlyArray2<f32>>,
+    view_tilt: Option<PyReadonlyArray1<f32>>,
     light_direction: PyReadonlyArray2<f64>,
     light_position_mm: PyReadonlyArray2<f64>,
     light_intensity: PyReadonlyArray2<f64>,
@@ -250,6 +251,7 @@ fn render<'py>(
         specular: specular.as_slice()?,
         shape: shape.as_slice()?,
         ambient: ambient.as_ref().map_or(Ok(&[][..]), |array| array.as_slice())?,
+        view_tilt: view_tilt.as_ref().map_or(Ok(&[][..]), |array| array.as_slice())?,
     };
     let pixels = parameters.pixels;
     check("normal", parameters.normal.len(), 3 * pixels)?;
@@ -258,6 +260,9 @@ fn render<'py>(
     check("shape", parameters.shape.len(), entry.shape.len() * pixels)?;
     if !parameters.ambient.is_empty() {
         check("ambient", parameters.ambient.len(), channels * pixels)?;
+    }
+    if !parameters.view_tilt.is_empty() {
+        check("view_tilt", parameters.view_tilt.len(), pixels)?;
     }
     check("light_intensity", light_intensity.len(), places.len() * channels)?;
     let intensity: Vec<f32> = light_intensity.as_array().iter().map(|&x| x as f32).collect();

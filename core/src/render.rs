@@ -15,6 +15,8 @@ pub struct Parameters<'a> {
     pub shape: &'a [f32],
     /// Empty for a model without ambient term.
     pub ambient: &'a [f32],
+    /// Tilt θv of the view in the arm's plane, which the paper's procedure fits per pixel; empty for the camera's own view.
+    pub view_tilt: &'a [f32],
 }
 
 /// One light and the camera.
@@ -45,7 +47,12 @@ pub fn render_group<M: Model, const FMA: bool>(
         (x_mm, y_mm) = (column(position, 2, 0), column(position, 2, 1));
     }
     let (direction, falloff) = view.light.seen_from(x_mm, y_mm);
-    let at = Illumination::new(direction, view.camera.seen_from(x_mm, y_mm).0);
+    let mut towards_camera = view.camera.seen_from(x_mm, y_mm).0;
+    if !parameters.view_tilt.is_empty() {
+        let tilt = column(parameters.view_tilt, 1, 0).0;
+        towards_camera = [Lane(tilt.map(f32::sin)), Lane::splat(0.0), Lane(tilt.map(f32::cos))];
+    }
+    let at = Illumination::new(direction, towards_camera);
     let normal = array!(|i| column(parameters.normal, 3, i));
     let mut shape = [Lane::splat(1.0); MAX_SHAPE];
     for (i, value) in shape.iter_mut().enumerate().take(M::SHAPE.len()) {

@@ -27,6 +27,7 @@ def fit(
     loss: str,
     loss_scale: float,
     max_steps: int,
+    paper: tuple[float, float, bool] | None = None,
 ) -> dict[str, NDArray[Any]]: ...
 def render(
     model: str,
@@ -36,6 +37,7 @@ def render(
     shape: NDArray[np.float32],
     ambient: NDArray[np.float32] | None,
     *,
+    view_tilt: NDArray[np.float32] | None = None,
     light_direction: NDArray[np.float64],
     light_position_mm: NDArray[np.float64],
     light_intensity: NDArray[np.float64],
