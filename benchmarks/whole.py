@@ -86,9 +86,10 @@ def _fit_memory(files: list[Path]) -> dict[str, float]:
     """Fit the first rows of the photographs from memory, on all cores."""
     import tifffile
 
-    from impasto.fit import FitOptions, fit_tile
     from impasto.geometry import Camera, Lights
     from impasto.models import parse_model
+    from impasto.procedure import FitOptions
+    from impasto.tile import fit_tile
 
     tiles = []
     for file in files:

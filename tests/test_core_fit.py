@@ -43,11 +43,11 @@ def fit(model, radiance, light_direction, **options):
         "offset": 0.0,
         "light_position_mm": np.full((lights, 3), np.nan),
         "light_intensity": np.ones((lights, channels)),
-        "view_direction": (0.0, 0.0, 1.0),
+        "view_direction": np.array([0.0, 0.0, 1.0]),
         "camera_distance_mm": None,
         "position_mm": None,
-        "light_rgb": [1.0] * channels,
-        "clip_level": [np.inf] * channels,
+        "light_rgb": np.ones(channels),
+        "clip_level": np.full(channels, np.inf),
         "shadow_level": -np.inf,
         "sample_mask": None,
         "noise": NOISE,
@@ -150,7 +150,7 @@ def fixed_problem():
         measured.radiance,
         measured.light_direction,
         noise=problem.NOISE,
-        view_direction=problem.VIEW_DIRECTION,
+        view_direction=np.array(problem.VIEW_DIRECTION),
         index=problem.INDEX,
     )
     return measured, fitted

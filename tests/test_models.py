@@ -64,7 +64,7 @@ def render(model, normal, diffuse, specular, shape, ambient=None, *, light_direc
     settings = {
         "light_position_mm": np.full((lights, 3), np.nan),
         "light_intensity": np.ones((lights, channels)),
-        "view_direction": (0.0, 0.0, 1.0),
+        "view_direction": np.array([0.0, 0.0, 1.0]),
         "camera_distance_mm": None,
         "position_mm": None,
         "light_rgb": np.ones(channels),
@@ -164,7 +164,7 @@ def test_float32_rendering_equals_the_reference(model):
     }
     options = {
         "light_direction": random_directions(rng, 7),
-        "view_direction": tuple(unit([0.1, -0.2, 1.0])),
+        "view_direction": unit([0.1, -0.2, 1.0]),
         "light_intensity": rng.uniform(0.5, 2, (7, 3)),
         "light_rgb": np.array([0.9, 1.0, 0.8]),
         "index": 1.6,
@@ -191,7 +191,7 @@ def test_near_lights_and_perspective_camera(model):
     options = {
         "light_direction": direction,
         "light_position_mm": position,
-        "view_direction": tuple(unit([0.0, 0.1, 1.0])),
+        "view_direction": unit([0.0, 0.1, 1.0]),
         "camera_distance_mm": 900.0,
         "position_mm": rng.uniform(-200, 200, (pixels, 2)).astype(np.float32),
     }
