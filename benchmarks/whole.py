@@ -19,8 +19,9 @@ import numpy as np
 from benchmarks.photographs import WHITE, Capture
 from benchmarks.problem import INDEX, MODEL, NOISE, VIEW_DIRECTION, light_directions
 
-# Pixels held in memory for the fit alone; a larger picture is the same blocks again.
+# Pixels held in memory for the fit alone, in tiles; a larger picture is the same blocks again.
 MEMORY_PX = 1 << 20
+TILE_PX = 1 << 16
 
 
 def run(command: list[str]) -> dict[str, float]:
@@ -68,8 +69,10 @@ def measure(capture: Capture, store: Path) -> dict[str, Any]:
 
 
 def _floor(what: str, folder: Path) -> dict[str, float]:
+    """Return the faster of two runs, each in a process of its own."""
     command = [sys.executable, "-m", "benchmarks.whole", what, str(folder)]
-    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    runs = [subprocess.run(command, check=True, capture_output=True, text=True) for _ in range(2)]
+    return min((json.loads(run.stdout) for run in runs), key=lambda result: result["seconds"])
 
 
 def _decode(files: list[Path]) -> dict[str, float]:
@@ -83,7 +86,7 @@ def _decode(files: list[Path]) -> dict[str, float]:
 
 
 def _fit_memory(files: list[Path]) -> dict[str, float]:
-    """Fit the first rows of the photographs from memory, on all cores."""
+    """Fit the first rows of the photographs from memory, tile by tile, on all cores."""
     import tifffile
 
     from impasto.geometry import Camera, Lights
@@ -91,11 +94,14 @@ def _fit_memory(files: list[Path]) -> dict[str, float]:
     from impasto.procedure import FitOptions
     from impasto.tile import fit_tile
 
-    tiles = []
+    rows = []
     for file in files:
         image = tifffile.imread(file)
-        tiles.append(image[: max(1, MEMORY_PX // image.shape[1])].reshape(-1, 3))
-    radiance = np.stack(tiles)
+        rows.append(image[: max(1, MEMORY_PX // image.shape[1])].reshape(-1, 3))
+    radiance = np.stack(rows)
+    pixels = radiance.shape[1]
+    starts = range(0, pixels, TILE_PX)
+    tiles = [np.ascontiguousarray(radiance[:, start : start + TILE_PX]) for start in starts]
     white = 65535 / WHITE
     settings: dict[str, Any] = {
         "lights": Lights(tuple(file.stem for file in files), light_directions()),
@@ -107,10 +113,11 @@ def _fit_memory(files: list[Path]) -> dict[str, float]:
         "options": FitOptions(index=INDEX),
     }
     model = parse_model(MODEL)
-    fit_tile(model, radiance[:, :4096], **settings)
+    fit_tile(model, tiles[0][:, :4096], **settings)
     started = time.perf_counter()
-    fit_tile(model, radiance, **settings)
-    return {"seconds": time.perf_counter() - started, "pixels": radiance.shape[1]}
+    for tile in tiles:
+        fit_tile(model, tile, **settings)
+    return {"seconds": time.perf_counter() - started, "pixels": pixels}
 
 
 if __name__ == "__main__":
