@@ -156,8 +156,24 @@ def fit(
         ),
     ] = None,
     procedure: Annotated[
-        str, typer.Option("--procedure", metavar="NAME", help=f"{' or '.join(PROCEDURES)}.")
-    ] = "joint",
+        str | None,
+        typer.Option(
+            "--procedure",
+            metavar="NAME",
+            help=f"{' or '.join(PROCEDURES)}; joint by default, for lights in one plane paper --refined.",
+        ),
+    ] = None,
+    refined: Annotated[
+        bool, typer.Option("--refined", help="The paper's procedure with the calibrated view.")
+    ] = FitOptions.refined,
+    threshold: Annotated[
+        str,
+        typer.Option(
+            "--threshold",
+            metavar="DEG|auto",
+            help="The paper's procedure: how far from its peak a highlight is seen.",
+        ),
+    ] = f"{FitOptions.threshold_deg:g}",
     index: Annotated[
         float, typer.Option("--index", metavar="N", help="Index of refraction of the surface.")
     ] = FitOptions.index,
@@ -191,9 +207,18 @@ def fit(
             loss_scale=loss_scale,
             shadow_level=shadow_level,
             exclude=tuple(exclude or ()),
+            refined=refined,
+            threshold_deg=_threshold(threshold),
         )
         more: dict[str, Any] = {"models": tuple(model)} if model else {}
-        summary = impasto.fit(store, procedure=procedure, options=options, overwrite=overwrite, **more)
+        summary = impasto.fit(
+            store,
+            procedure=procedure,
+            options=options,
+            overwrite=overwrite,
+            say=lambda note: report.say(f"note: {note}"),
+            **more,
+        )
         report.say_all(fit_lines(summary))
         report.say(f"next: impasto maps {store} --model {summary.models[0].model} --out maps/")
         report.done(summary)
@@ -311,6 +336,17 @@ def demo(
         report.say(f"everything took {seconds(summary.seconds)}; open this page in a browser:")
         report.say(f"    {summary.page.resolve()}")
         report.done(summary)
+
+
+def _threshold(text: str) -> float | None:
+    if text == "auto":
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        raise OptionError(
+            Problem(f"--threshold {text}", "is neither a number of degrees nor auto", "Try 35, or auto")
+        ) from None
 
 
 def _size(text: str) -> tuple[int, int]:

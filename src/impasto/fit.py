@@ -4,25 +4,31 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from impasto import store as stores
+from impasto.arm import find_arm
 from impasto.errors import ImpastoError, OptionError, Problem, StoreError, raise_problems
-from impasto.joint import Joint, fit_tile
+from impasto.joint import Joint
 from impasto.models import ModelSpec, parse_model
-from impasto.procedure import FitOptions, Procedure
+from impasto.paper import Paper
+from impasto.procedure import Findings, FitOptions, Procedure
 from impasto.progress import progress
 from impasto.pyramid import Pyramid
 from impasto.streaming import fit_units
+from impasto.tile import fit_tile
 
 __all__ = ["PROCEDURES", "FitOptions", "FitSummary", "ModelFit", "fit", "fit_tile"]
 
-PROCEDURES: dict[str, Callable[[stores.Stack, ModelSpec, FitOptions], Procedure]] = {"joint": Joint}
+PROCEDURES: dict[str, Callable[[stores.Stack, ModelSpec, FitOptions], Procedure]] = {
+    "joint": Joint,
+    "paper": Paper,
+}
 
 
 @dataclass(frozen=True)
@@ -32,6 +38,8 @@ class ModelFit:
     Parameters
     ----------
     model : str
+    procedure : str
+        How it was fitted, in words.
     pixels : dict of str to int
         Number of pixels per status, by its meaning; all of the image.
     already : bool
@@ -41,14 +49,18 @@ class ModelFit:
     seconds : float
     pixels_per_second : float
         Of those that this run fitted, with reading and writing; 0 if none.
+    notes : tuple of str
+        What the procedure cannot know, what it assumed instead, and what it found.
     """
 
     model: str
+    procedure: str
     pixels: dict[str, int]
     already: bool
     continued: bool
     seconds: float
     pixels_per_second: float
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -58,7 +70,6 @@ class FitSummary:
     Parameters
     ----------
     store : Path
-    procedure : str
     photographs : int
         Those that the fits used.
     height, width, channels : int
@@ -71,7 +82,6 @@ class FitSummary:
     """
 
     store: Path
-    procedure: str
     photographs: int
     height: int
     width: int
@@ -86,10 +96,11 @@ def fit(
     store: str | os.PathLike[str],
     *,
     models: Iterable[str] = ("torrance-sparrow", "phong"),
-    procedure: str = "joint",
+    procedure: str | None = None,
     options: FitOptions | None = None,
     overwrite: bool = False,
     show_progress: bool | None = None,
+    say: Callable[[str], None] | None = None,
 ) -> FitSummary:
     """Fit models to every pixel of a stack.
 
@@ -104,12 +115,15 @@ def fit(
     models : iterable of str, optional
         Names of the models.
     procedure : str, optional
-        How to fit: a key of `PROCEDURES`.
+        How to fit: a key of `PROCEDURES`. By default ``joint``, or, for lights in one plane, ``paper`` in its
+        refined form where it is defined for the model.
     options : FitOptions, optional
     overwrite : bool, optional
         Whether to compute fits again that are complete.
     show_progress : bool, optional
         Whether to show a progress bar; by default, if standard error is a terminal.
+    say : callable, optional
+        Called with each note of the summary as soon as it is known, which for most is before the long work.
 
     Returns
     -------
@@ -125,34 +139,40 @@ def fit(
     """
     started = time.perf_counter()
     path = Path(store)
-    stack, procedures = _prepare(path, list(models), procedure, options or FitOptions())
+    say = say or (lambda note: None)
+    stack, procedures, notes = _prepare(path, list(models), procedure, options or FitOptions())
+    for note in notes:
+        say(note)
     with stores.run(path, "fit") as log:
         jobs = [_Job(path, stack, name, chosen) for name, chosen in procedures.items()]
         raise_problems(StoreError, [problem for job in jobs for problem in job.problems(overwrite)])
         needed = sum(job.bytes_to_write(overwrite) for job in jobs)
         raise_problems(StoreError, stores.no_room(path, needed))
+        for job in jobs:
+            job.prepare(overwrite, show_progress)
+        for note in dict.fromkeys(note for job in jobs for note in job.notes):
+            say(f"{', '.join(job.model for job in jobs if note in job.notes)}: {note}")
         done = []
         for job in jobs:
-            done.append(job.run(overwrite, show_progress))
+            done.append(job.run(overwrite, show_progress, say))
             log.write("model", **vars(done[-1]))
     lights, height, width, channels = stack.shape
     return FitSummary(
         store=path,
-        procedure=procedure,
         photographs=lights - len((options or FitOptions()).exclude),
         height=height,
         width=width,
         channels=channels,
         clipped_samples=stack.clipped_samples,
         models=tuple(done),
-        notes=_notes(stack),
+        notes=notes,
         seconds=time.perf_counter() - started,
     )
 
 
 def _prepare(
-    store: Path, models: list[str], procedure: str, options: FitOptions
-) -> tuple[stores.Stack, dict[str, Procedure]]:
+    store: Path, models: list[str], procedure: str | None, options: FitOptions
+) -> tuple[stores.Stack, dict[str, Procedure], tuple[str, ...]]:
     """Open the stack and make the procedures; raise everything that is wrong with either together."""
     problems = options.problems()
     specs: dict[str, ModelSpec] = {}
@@ -164,7 +184,7 @@ def _prepare(
             problems += error.problems
     if not models:
         problems.append(Problem("--model", "no model is named", "Name one, such as torrance-sparrow"))
-    if procedure not in PROCEDURES:
+    if procedure is not None and procedure not in PROCEDURES:
         choices = ", ".join(PROCEDURES)
         problems.append(Problem("--procedure", f"there is no {procedure!r}", f"Choose from {choices}"))
     try:
@@ -176,11 +196,35 @@ def _prepare(
     procedures = {}
     for name, spec in specs.items():
         try:
-            procedures[name] = PROCEDURES[procedure](stack, spec, options)
+            make = _usual_procedure if procedure is None else PROCEDURES[procedure]
+            procedures[name] = make(stack, spec, options)
         except ImpastoError as error:
             problems += error.problems
-    raise_problems(OptionError, problems)
-    return stack, procedures
+    # Lights and options are common to the models: their problems are told once.
+    raise_problems(OptionError, dict.fromkeys(problems))
+    notes = _notes(stack)
+    if procedure is None and not options.refined:
+        chosen = [name for name, made in procedures.items() if isinstance(made, Paper)]
+        if chosen:
+            notes += (
+                f"the lights lie in one plane and no procedure was asked for: {' and '.join(chosen)} by the "
+                "paper's, refined, because a joint fit cannot identify φn and As there",
+            )
+    return stack, procedures, notes
+
+
+def _usual_procedure(stack: stores.Stack, spec: ModelSpec, options: FitOptions) -> Procedure:
+    """Return the procedure for when none was asked for: joint where the lights allow it."""
+    refined = replace(options, refined=True)
+    if options.refined:
+        return Paper(stack, spec, refined)
+    used = [number for number, name in enumerate(stack.lights.names) if name not in options.exclude]
+    if not find_arm(stack.lights.direction[used]).planar:
+        return Joint(stack, spec, options)
+    try:
+        return Paper(stack, spec, refined)
+    except OptionError:
+        return Joint(stack, spec, options)
 
 
 def _unknown_names(stack: stores.Stack, options: FitOptions) -> list[Problem]:
@@ -225,6 +269,7 @@ class _Job:
             "settings_sha256": stores.digest(settings),
         }
         self.found = stores.fit_attributes(store, model)
+        self.notes: tuple[str, ...] = ()
 
     @property
     def _same_settings(self) -> bool:
@@ -238,13 +283,9 @@ class _Job:
 
     @property
     def _continues(self) -> bool:
-        # Another version may compute other numbers; one fit must not hold both.
-        return (
-            self.found is not None
-            and not self._complete
-            and self._same_settings
-            and self.found.get("version") == self.attributes["version"]
-        )
+        # Another version, or machine, may compute other numbers; one fit must not hold both.
+        found = self.found
+        return found is not None and not self._complete and found.items() >= self.attributes.items()
 
     def problems(self, overwrite: bool) -> list[Problem]:
         """Return what forbids the fit: one that is complete and was made otherwise."""
@@ -268,7 +309,18 @@ class _Job:
         # A third more for the coarser levels; nothing less for compression, because the last bits are noise.
         return self.size[0] * self.size[1] * per_pixel * 4 // 3 - there
 
-    def run(self, overwrite: bool, show_progress: bool | None) -> ModelFit:
+    def prepare(self, overwrite: bool, show_progress: bool | None) -> None:
+        """Find out what holds for the whole sample; what is complete needs nothing."""
+        if self._complete and not overwrite:
+            self.notes = tuple((self.found or {}).get("notes", ()))
+        else:
+            self._add(self.procedure.prepare(show_progress))
+
+    def _add(self, findings: Findings) -> None:
+        self.notes += findings.notes
+        self.attributes.update(findings.attributes, notes=list(self.notes))
+
+    def run(self, overwrite: bool, show_progress: bool | None, say: Callable[[str], None]) -> ModelFit:
         """Fit what is missing, then write the coarser levels, then declare the fit complete."""
         started = time.perf_counter()
         if self._complete and not overwrite:
@@ -297,8 +349,18 @@ class _Job:
         counts = writer.status_counts()
         pixels = {text: int(counts[code]) for code, text in stores.STATUS_MEANING.items() if counts[code]}
         result = {"pixels": pixels, "clipped_samples": self.stack.clipped_samples}
-        writer.finish(result)
+        conclusion = self.procedure.conclude(self._read)
+        self._add(conclusion)
+        for note in conclusion.notes:
+            say(f"{self.model}: {note}")
+        writer.finish({**result, **conclusion.attributes, "notes": list(self.notes)})
         return self._summary(result, started, already=False, continued=continued, fitted=fitted)
+
+    def _read(self, *names: str) -> Iterator[stores.Maps]:
+        """Yield maps of the fit, unit by unit."""
+        fitted = stores.Fit(self.store, stores.fit_group(self.model), {})
+        for unit in stores.units(*self.size):
+            yield fitted.read(unit.rows, unit.columns, names)
 
     def _summary(
         self, result: dict[str, Any], started: float, *, already: bool, continued: bool, fitted: int
@@ -306,9 +368,16 @@ class _Job:
         seconds = time.perf_counter() - started
         return ModelFit(
             model=self.model,
+            procedure=self._procedure,
             pixels=result["pixels"],
             already=already,
             continued=continued,
             seconds=seconds,
             pixels_per_second=fitted / seconds,
+            notes=self.notes,
         )
+
+    @property
+    def _procedure(self) -> str:
+        refined = self.attributes["options"].get("refined", False)
+        return f"{self.attributes['procedure']}{', refined' * refined}"

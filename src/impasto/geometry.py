@@ -81,6 +81,13 @@ def direction_tilts(direction: ArrayLike) -> tuple[Array, Array]:
     return np.arctan2(x, z), np.arcsin(np.clip(y, -1.0, 1.0))
 
 
+def turn_about_z(direction: ArrayLike, angle: float) -> Array:
+    """Return vectors (..., 3) turned about the painting's normal by an angle in radians, from +X to +Y."""
+    x, y, z = np.moveaxis(np.asarray(direction, dtype=np.float64), -1, 0)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.stack([cosine * x - sine * y, sine * x + cosine * y, z], axis=-1)
+
+
 @dataclass(frozen=True)
 class Lights:
     """The lights of a capture, one per photograph.

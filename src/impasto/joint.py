@@ -2,93 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from impasto import store as stores
+from impasto.arm import find_arm
 from impasto.errors import OptionError, Problem, raise_problems
-from impasto.geometry import Camera, Lights, pixel_position_mm
+from impasto.geometry import pixel_position_mm
 from impasto.models import ModelSpec
-from impasto.procedure import FitOptions
+from impasto.procedure import Findings, FitOptions
+from impasto.tile import fit_tile
 
-
-def fit_tile(
-    model: ModelSpec,
-    radiance: NDArray[Any],
-    *,
-    lights: Lights,
-    camera: Camera,
-    light_rgb: NDArray[np.float64],
-    clip_level: NDArray[np.float64],
-    noise: tuple[float, float, float],
-    scale: float = 1.0,
-    offset: float = 0.0,
-    position_mm: NDArray[np.float32] | None = None,
-    options: FitOptions | None = None,
-) -> stores.Maps:
-    """Fit a model to pixels by the joint procedure.
-
-    Parameters
-    ----------
-    model : ModelSpec
-    radiance : ndarray of shape (L, N, C), uint16 or float32
-        Relative radiance = scale * value + offset; NaN where a float sample is missing.
-    lights : Lights
-        One per row of `radiance`.
-    camera : Camera
-    light_rgb : ndarray of shape (C,), float64
-        Colour of the light, which is the colour of the specular term.
-    clip_level : ndarray of shape (C,), float64
-        Relative radiance from which on a sample is left out; infinite for none.
-    noise : tuple of float
-        (read, photon, relative) in relative radiance; see `store.Stack.noise`.
-    scale, offset : float, optional
-    position_mm : ndarray of shape (N, 2), float32, optional
-        Where the pixels lie; needed if a light or the camera is near.
-    options : FitOptions, optional
-
-    Returns
-    -------
-    dict of str to ndarray of shape (N[, k]), float32; ``status`` uint8
-        By the names of `store.fit_maps`.
-    """
-    from impasto import _core
-
-    options = options or FitOptions()
-    count, _, channels = radiance.shape
-    result = _core.fit(
-        model.name,
-        np.ascontiguousarray(radiance),
-        scale=scale,
-        offset=offset,
-        light_direction=lights.direction,
-        light_position_mm=lights.position_mm,
-        light_intensity=np.ascontiguousarray(np.broadcast_to(lights.intensity, (count, channels))),
-        view_direction=camera.view_direction,
-        camera_distance_mm=camera.distance_mm,
-        position_mm=position_mm,
-        light_rgb=np.asarray(light_rgb, np.float64),
-        clip_level=np.asarray(clip_level, np.float64),
-        shadow_level=-np.inf if options.shadow_level is None else options.shadow_level,
-        sample_mask=None,
-        noise=noise,
-        index=options.index,
-        fresnel=options.fresnel,
-        loss=options.loss,
-        loss_scale=options.loss_scale,
-        max_steps=options.max_steps,
-    )
-    for ending in ("", "_sd"):
-        if model.shape_names:
-            shape = result.pop(f"shape{ending}")
-            for column, name in enumerate(model.shape_names):
-                result[f"{name}{ending}"] = shape[:, column]
-        if model.lobes == 1:
-            result[f"specular{ending}"] = result[f"specular{ending}"][:, 0]
-    return dict(result)
+_FOREIGN = {"refined": "paper", "threshold_deg": "paper"}
 
 
 class Joint:
@@ -124,7 +52,7 @@ class Joint:
         raise_problems(OptionError, self._problems())
 
     def _problems(self) -> list[Problem]:
-        problems = []
+        problems = self._options.foreign(_FOREIGN, self.name)
         # Counted for one channel: the others of a grey pixel tell nothing more.
         unknowns = 2 + len(self._model.shape_names) + 1 + self._model.lobes + int(self._model.ambient)
         if len(self.lights) < unknowns:
@@ -150,18 +78,31 @@ class Joint:
     @property
     def attributes(self) -> dict[str, Any]:
         """Attributes of the fit."""
-        options = asdict(self._options)
         return {
             "model": self._model.name,
             "procedure": self.name,
-            "index_of_refraction": options.pop("index"),
-            "fresnel": options.pop("fresnel"),
-            "options": {**options, "exclude": list(options["exclude"])},
+            **self._options.attributes(_FOREIGN),
             "light_rgb": self._light_rgb.tolist(),
             "light_rgb_source": "assumed white" if self._stack.light_rgb is None else "stack",
             "stack_sha256": self._stack.sha256,
             "photographs": len(self.lights),
         }
+
+    def prepare(self, show_progress: bool | None) -> Findings:
+        """Say what lights in one plane leave open; see `Procedure.prepare`."""
+        if not find_arm(self._selected.direction).planar:
+            return Findings()
+        return Findings(
+            notes=(
+                "the lights lie in one plane, which does not tell how far a normal tilts out of it, nor Ad "
+                "and As apart from that tilt: they rest on where the joint fit starts. --procedure paper "
+                "--refined says what it assumes instead",
+            )
+        )
+
+    def conclude(self, read: Callable[..., Iterator[stores.Maps]]) -> Findings:
+        """Add nothing; see `Procedure.conclude`."""
+        return Findings()
 
     def fit(self, radiance: NDArray[Any], rows: slice, columns: slice) -> stores.Maps:
         """Fit a tile; see `Procedure.fit`."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol
 
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from impasto.errors import Problem
 
 @dataclass(frozen=True, kw_only=True)
 class FitOptions:
-    """How the pixels of a fit are treated; part of what identifies a fit.
+    """How the pixels of a fit are treated; those that its procedure uses are part of what identifies a fit.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ class FitOptions:
     fresnel : str
         ``facet`` or ``element``: whose angle of incidence the Fresnel reflectance takes.
     loss : str
-        ``linear``, ``cauchy`` or ``huber``.
+        ``linear``, ``cauchy`` or ``huber``; of the joint procedure.
     loss_scale : float
         Residual, in standard deviations, from which on the robust losses grow slower than squares.
     max_steps : int
@@ -32,6 +32,11 @@ class FitOptions:
         Relative radiance below which a sample is left out as shadowed.
     exclude : tuple of str
         Names of photographs to leave out.
+    refined : bool
+        Whether the paper's procedure keeps the calibrated view and frees the normal instead.
+    threshold_deg : float or None
+        Angle from a pixel's brightest light, in degrees, from which on the paper's procedure takes lights to
+        carry no specular term; None to have it chosen.
     """
 
     index: float = 1.5
@@ -41,6 +46,8 @@ class FitOptions:
     max_steps: int = 60
     shadow_level: float | None = None
     exclude: tuple[str, ...] = ()
+    refined: bool = False
+    threshold_deg: float | None = 35.0
 
     def problems(self) -> list[Problem]:
         """Return everything that is wrong with the options, apart from names to exclude."""
@@ -59,14 +66,79 @@ class FitOptions:
             problems.append(Problem("--loss-scale", f"is {self.loss_scale}, expected above 0", "Try 3"))
         if self.max_steps < 1:
             problems.append(Problem("--max-steps", f"is {self.max_steps}, expected 1 or more", "Try 60"))
+        if self.threshold_deg is not None and not 0.0 < self.threshold_deg < 90.0:
+            problems.append(
+                Problem(
+                    "--threshold",
+                    f"is {self.threshold_deg} degrees, expected 0 to 90",
+                    "Try 35 as in the paper, or auto",
+                )
+            )
         return problems
+
+    def foreign(self, others: Mapping[str, str], procedure: str) -> list[Problem]:
+        """Return a problem for each option that was set and that a procedure does not have.
+
+        Parameters
+        ----------
+        others : mapping of str to str
+            Names of the options it does not have, and the procedure that has them.
+        procedure : str
+            Its name.
+        """
+        usual = FitOptions()
+        return [
+            Problem(
+                where=f"--{name.removesuffix('_deg').replace('_', '-')}",
+                what=f"is no option of the {procedure} procedure, but of the {owner} one",
+                do=f"Leave it out, or choose --procedure {owner}",
+            )
+            for name, owner in others.items()
+            if getattr(self, name) != getattr(usual, name)
+        ]
+
+    def attributes(self, others: Mapping[str, str]) -> dict[str, Any]:
+        """Return the options as attributes of a fit, without `others`, which its procedure does not have."""
+        options = asdict(self)
+        return {
+            "index_of_refraction": options.pop("index"),
+            "fresnel": options.pop("fresnel"),
+            "options": {
+                name: list(value) if isinstance(value, tuple) else value
+                for name, value in options.items()
+                if name not in others
+            },
+        }
+
+    @classmethod
+    def of(cls, attributes: Mapping[str, Any]) -> FitOptions:
+        """Return the options that a fit with these attributes was made with."""
+        options = dict(attributes["options"])
+        options["exclude"] = tuple(options["exclude"])
+        return cls(index=attributes["index_of_refraction"], fresnel=attributes["fresnel"], **options)
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a procedure found out that concerns the whole sample.
+
+    Parameters
+    ----------
+    attributes : mapping
+        For the attributes of the fit, as JSON.
+    notes : tuple of str
+        What cannot be known, what was assumed instead, and what was found, in words.
+    """
+
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 class Procedure(Protocol):
     """A way to fit one model: what it computes for a tile, and what it says about itself.
 
-    Everything that the result depends on must be in `attributes`, because that decides whether an interrupted
-    fit is continued.
+    Everything that the result depends on must follow from `attributes`, because that decides whether a fit is
+    the one that was asked for.
     """
 
     @property
@@ -80,6 +152,24 @@ class Procedure(Protocol):
     @property
     def lights(self) -> Sequence[int] | None:
         """Numbers of the photographs it reads; None for all."""
+
+    def prepare(self, show_progress: bool | None) -> Findings:
+        """Find out what holds for the whole sample, before any tile is fitted; may read the whole stack.
+
+        Parameters
+        ----------
+        show_progress : bool or None
+            Whether to show a progress bar; by default, if standard error is a terminal.
+        """
+
+    def conclude(self, read: Callable[..., Iterator[stores.Maps]]) -> Findings:
+        """Say what can be said once all pixels are fitted.
+
+        Parameters
+        ----------
+        read : callable
+            Called with names of maps; yields these maps piece by piece, always in the same order.
+        """
 
     def fit(self, radiance: NDArray[Any], rows: slice, columns: slice) -> stores.Maps:
         """Fit a tile.

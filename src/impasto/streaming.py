@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,6 @@ from impasto.store import STACK_CHUNK, Maps, Stack, Unit
 # the next is filled, the whole process stays under 1 GB, whatever the size and number of the photographs. Not
 # an option, because the result must not depend on it.
 _TILE_BYTES = 64 << 20
-
-Tile = tuple[Unit, slice, slice]
 
 
 def fit_units(
@@ -48,15 +47,13 @@ def fit_units(
     StoreError
         If the stack is damaged or the disk is full.
     """
-    height = _tile_rows(stack, procedure)
-    tiles = [(unit, *place) for unit in units for place in unit.tiles(height, STACK_CHUNK)]
     with (
-        ThreadPoolExecutor(1, thread_name_prefix="read") as reader,
+        closing(read_tiles(stack, procedure.lights, units)) as tiles,
         ThreadPoolExecutor(1, thread_name_prefix="write") as writer,
     ):
         written: Future[None] | None = None
         maps: Maps = {}
-        for (unit, rows, columns), radiance in _read_ahead(stack, procedure, tiles, height, reader):
+        for unit, rows, columns, radiance in tiles:
             if not maps:
                 maps = {
                     map.name: np.empty(map.shape(unit.height, unit.width), map.dtype)
@@ -77,36 +74,56 @@ def fit_units(
             written.result()
 
 
-def _tile_rows(stack: Stack, procedure: Procedure) -> int:
-    """Return how many rows of a chunk's width make a tile: the whole chunk, or less where lights are many."""
-    rows = STACK_CHUNK
-    while rows > 32 and _elements(stack, procedure, rows) * stack.dtype.itemsize > _TILE_BYTES:
-        rows //= 2
-    return rows
+def read_tiles(
+    stack: Stack, lights: Sequence[int] | None, units: Sequence[Unit]
+) -> Generator[tuple[Unit, slice, slice, NDArray[Any]]]:
+    """Yield the tiles of units while the next is being read.
 
+    Parameters
+    ----------
+    stack : Stack
+    lights : sequence of int or None
+        Which photographs; None for all.
+    units : sequence of Unit
 
-def _elements(stack: Stack, procedure: Procedure, rows: int) -> int:
-    """Return the number of samples in a tile of `rows` rows."""
-    lights, _, _, channels = stack.shape
-    return (lights if procedure.lights is None else len(procedure.lights)) * rows * STACK_CHUNK * channels
+    Yields
+    ------
+    unit : Unit
+    rows, columns : slice
+        Where the tile lies.
+    radiance : ndarray of shape (L, rows, columns, C), uint16 or float32
+        Values as stored; valid until the next tile.
 
-
-def _read_ahead(
-    stack: Stack, procedure: Procedure, tiles: Sequence[Tile], rows: int, reader: ThreadPoolExecutor
-) -> Iterator[tuple[Tile, NDArray[Any]]]:
-    """Yield each tile with its stored values, valid until the next, while the next is being read."""
-    buffers = [np.empty(_elements(stack, procedure, rows), stack.dtype) for _ in range(2)]
+    Raises
+    ------
+    StoreError
+        If the stack is damaged.
+    """
+    all_lights, _, _, channels = stack.shape
+    samples = (all_lights if lights is None else len(lights)) * channels
+    height = _tile_rows(samples * stack.dtype.itemsize)
+    tiles = [(unit, *place) for unit in units for place in unit.tiles(height, STACK_CHUNK)]
+    buffers = [np.empty(samples * height * STACK_CHUNK, stack.dtype) for _ in range(2)]
 
     def read(number: int) -> NDArray[Any]:
         _, rows, columns = tiles[number]
-        return stack.read(rows, columns, procedure.lights, buffers[number % 2])
+        return stack.read(rows, columns, lights, buffers[number % 2])
 
-    coming = reader.submit(read, 0) if tiles else None
-    for number, tile in enumerate(tiles):
-        assert coming is not None
-        values = coming.result()
-        coming = reader.submit(read, number + 1) if number + 1 < len(tiles) else None
-        yield tile, values
+    with ThreadPoolExecutor(1, thread_name_prefix="read") as reader:
+        coming = reader.submit(read, 0) if tiles else None
+        for number, tile in enumerate(tiles):
+            assert coming is not None
+            values = coming.result()
+            coming = reader.submit(read, number + 1) if number + 1 < len(tiles) else None
+            yield (*tile, values)
+
+
+def _tile_rows(pixel_bytes: int) -> int:
+    """Return how many rows of a chunk's width make a tile: the whole chunk, or less where lights are many."""
+    rows = STACK_CHUNK
+    while rows > 32 and pixel_bytes * rows * STACK_CHUNK > _TILE_BYTES:
+        rows //= 2
+    return rows
 
 
 def _shifted(pixels: slice, origin: slice) -> slice:

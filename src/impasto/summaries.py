@@ -45,16 +45,12 @@ def stack_lines(summary: StackSummary) -> Iterator[str]:
 
 
 def fit_lines(summary: FitSummary) -> Iterator[str]:
-    """Yield how the pixels of each model ended."""
-    yield (
-        f"{summary.width} x {summary.height} px under {_count(summary.photographs, 'light')}, "
-        f"procedure {summary.procedure}"
-    )
+    """Yield how the pixels of each model ended; `fit` has said its notes before."""
+    yield f"{summary.width} x {summary.height} px under {_count(summary.photographs, 'light')}"
     for model in summary.models:
-        yield f"{model.model}: {_how(model)}"
+        yield f"{model.model}, procedure {model.procedure}: {_how(model)}"
         total = max(sum(model.pixels.values()), 1)
         yield from (f"    {meaning}: {percent(count / total)}" for meaning, count in model.pixels.items())
-    yield from (f"note: {note}" for note in summary.notes)
     yield f"{summary.store} is ready ({seconds(summary.seconds)})"
 
 

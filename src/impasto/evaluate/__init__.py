@@ -8,7 +8,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass, fields, replace
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -162,11 +161,12 @@ def evaluate(
                     options=blind,
                     show_progress=show_progress,
                 )
-            errors = _compare(open_fit(source, spec.name), stack, held, show_progress)
+            fitted = open_fit(source, spec.name)
+            errors = _compare(fitted, stack, held, show_progress)
             results.append(
                 ModelErrors(
                     model=spec.name,
-                    procedure=procedure,
+                    procedure=str(fitted.attributes["procedure"]),
                     refitted=not unseen,
                     lights=errors,
                     mean=_mean([entry.errors for entry in errors]),
@@ -200,15 +200,12 @@ def _held_out(
     return listed_lights([(f"held-out photograph {name}", name) for name in chosen], lights.names)
 
 
-def _settings(store: Path, model: str) -> tuple[str, FitOptions]:
+def _settings(store: Path, model: str) -> tuple[str | None, FitOptions]:
     """Return the procedure and the options of the fit in the store, or the default ones."""
-    found: dict[str, Any] | None = fit_attributes(store, model)
+    found = fit_attributes(store, model)
     if not found:
-        return "joint", FitOptions()
-    options = {**found["options"], "exclude": tuple(found["options"]["exclude"])}
-    return found["procedure"], FitOptions(
-        index=found["index_of_refraction"], fresnel=found["fresnel"], **options
-    )
+        return None, FitOptions()
+    return found["procedure"], FitOptions.of(found)
 
 
 def _compare(

@@ -1,0 +1,116 @@
+"""One tile of pixels through the compiled core, by either procedure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impasto import store as stores
+from impasto.geometry import Camera, Lights
+from impasto.models import ModelSpec
+from impasto.procedure import FitOptions
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What the paper's procedure takes to hold for the whole sample.
+
+    Parameters
+    ----------
+    threshold : float
+        Lights at least this far from a pixel's brightest, in radians, are taken to carry no specular term.
+    specular : float
+        As; NaN stops after the diffuse stage.
+    refined : bool
+        Whether the calibrated view is kept, and Ad, the normal and the shape are fitted over all lights.
+    """
+
+    threshold: float
+    specular: float
+    refined: bool
+
+
+def fit_tile(
+    model: ModelSpec,
+    radiance: NDArray[Any],
+    *,
+    lights: Lights,
+    camera: Camera,
+    light_rgb: NDArray[np.float64],
+    clip_level: NDArray[np.float64],
+    noise: tuple[float, float, float],
+    scale: float = 1.0,
+    offset: float = 0.0,
+    position_mm: NDArray[np.float32] | None = None,
+    options: FitOptions | None = None,
+    paper: Sample | None = None,
+) -> stores.Maps:
+    """Fit a model to pixels: by the joint procedure, or by the paper's for a sample.
+
+    Parameters
+    ----------
+    model : ModelSpec
+    radiance : ndarray of shape (L, N, C), uint16 or float32
+        Relative radiance = scale * value + offset; NaN where a float sample is missing.
+    lights : Lights
+        One per row of `radiance`.
+    camera : Camera
+    light_rgb : ndarray of shape (C,), float64
+        Colour of the light, which is the colour of the specular term.
+    clip_level : ndarray of shape (C,), float64
+        Relative radiance from which on a sample is left out; infinite for none.
+    noise : tuple of float
+        (read, photon, relative) in relative radiance; see `store.Stack.noise`.
+    scale, offset : float, optional
+    position_mm : ndarray of shape (N, 2), float32, optional
+        Where the pixels lie; needed if a light or the camera is near.
+    options : FitOptions, optional
+    paper : Sample, optional
+        What holds for the whole sample, for the paper's procedure; its arm sweeps the XZ plane.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (N[, k]), float32; ``status`` uint8
+        By the names of `store.fit_maps`; by the paper's procedure without standard deviations and chi-square,
+        and with ``view_tilt``.
+    """
+    from impasto import _core
+
+    options = options or FitOptions()
+    count, _, channels = radiance.shape
+    result = _core.fit(
+        model.name,
+        np.ascontiguousarray(radiance),
+        scale=scale,
+        offset=offset,
+        light_direction=lights.direction,
+        light_position_mm=lights.position_mm,
+        light_intensity=np.ascontiguousarray(np.broadcast_to(lights.intensity, (count, channels))),
+        view_direction=camera.view_direction,
+        camera_distance_mm=camera.distance_mm,
+        position_mm=position_mm,
+        light_rgb=np.asarray(light_rgb, np.float64),
+        clip_level=np.asarray(clip_level, np.float64),
+        shadow_level=-np.inf if options.shadow_level is None else options.shadow_level,
+        sample_mask=None,
+        noise=noise,
+        index=options.index,
+        fresnel=options.fresnel,
+        loss=options.loss,
+        loss_scale=options.loss_scale,
+        max_steps=options.max_steps,
+        paper=None if paper is None else (paper.threshold, paper.specular, paper.refined),
+    )
+    for ending in ("", "_sd"):
+        if f"specular{ending}" not in result:
+            continue
+        if model.shape_names:
+            shape = result.pop(f"shape{ending}")
+            for column, name in enumerate(model.shape_names):
+                result[f"{name}{ending}"] = shape[:, column]
+        if model.lobes == 1:
+            result[f"specular{ending}"] = result[f"specular{ending}"][:, 0]
+    return dict(result)
