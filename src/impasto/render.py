@@ -20,7 +20,7 @@ from impasto.animation import Animation
 from impasto.band_writers import BandWriter, prepare_folder
 from impasto.colour import encode_srgb
 from impasto.errors import OptionError, Problem
-from impasto.geometry import Camera, Lights, pixel_position_mm
+from impasto.geometry import Camera, Lights, pixel_position_mm, turn_about_z
 from impasto.models import parse_model
 from impasto.progress import progress
 from impasto.render_lights import requested_lights
@@ -282,6 +282,10 @@ def render_bands(fit: Fit, lights: Lights, camera: Camera) -> Iterator[Band]:
     names = ["normal", "diffuse", *spec.shape_names]
     names += ["specular"] if spec.lobes else []
     names += ["ambient"] if spec.ambient else []
+    # The paper's procedure, taken literally, gives each pixel a view of its own in the plane of its arm.
+    tilted = "view_tilt" in fit.names
+    names += ["view_tilt"] if tilted else []
+    arm_azimuth = np.radians(fit.attributes["sample"]["arm_azimuth_deg"]) if tilted else 0.0
     step = _band_rows(
         width, 8 + 2 * channels + spec.lobes + len(spec.shape_names) + 3 * channels * len(lights)
     )
@@ -299,6 +303,14 @@ def render_bands(fit: Fit, lights: Lights, camera: Camera) -> Iterator[Band]:
         missing = ~np.isfinite(normal).all(axis=1)
         matte = ~missing & ~(np.isfinite(specular).all(axis=1) & np.isfinite(shape).all(axis=1))
         specular[matte], shape[matte] = 0.0, 1.0
+        position = _position(rows, fit.shape, camera) if near else None
+        if tilted:
+            flat["view_tilt"][matte] = 0.0
+            normal = turn_about_z(normal, -arm_azimuth).astype(np.float32)
+            if position is not None:
+                position = turn_about_z(np.pad(position, ((0, 0), (0, 1))), -arm_azimuth)[:, :2].astype(
+                    np.float32
+                )
         radiance = _core.render(
             spec.name,
             normal,
@@ -306,12 +318,13 @@ def render_bands(fit: Fit, lights: Lights, camera: Camera) -> Iterator[Band]:
             specular,
             shape,
             flat.get("ambient"),
-            light_direction=lights.direction,
-            light_position_mm=lights.position_mm,
+            view_tilt=flat["view_tilt"][:, 0] if tilted else None,
+            light_direction=turn_about_z(lights.direction, -arm_azimuth),
+            light_position_mm=turn_about_z(lights.position_mm, -arm_azimuth),
             light_intensity=np.ascontiguousarray(np.broadcast_to(lights.intensity, (len(lights), channels))),
             view_direction=camera.view_direction,
             camera_distance_mm=camera.distance_mm,
-            position_mm=_position(rows, fit.shape, camera) if near else None,
+            position_mm=position,
             light_rgb=light_rgb,
             index=fit.attributes["index_of_refraction"],
             fresnel=fit.attributes["fresnel"],
