@@ -11,6 +11,7 @@ use crate::paper::{PaperFit, Sample};
 use crate::record::{FitGroup, Layout};
 use crate::render::{Parameters, View, render_group};
 use rayon::prelude::*;
+use std::sync::LazyLock;
 
 /// Pixels that one thread takes at a time: enough to hide the start of a task, few enough to share a tile evenly.
 const BLOCK: usize = 64 * LANES;
@@ -36,12 +37,16 @@ pub struct Fitted {
     pub status: Vec<u8>,
 }
 
-/// Whether the processor has the instructions of the fast version.
+/// Whether the fast version runs: the processor has its instructions, and IMPASTO_PLAIN is not set in the environment.
 pub fn fast_instructions() -> bool {
-    #[cfg(target_arch = "x86_64")]
-    return std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma");
-    #[cfg(not(target_arch = "x86_64"))]
-    return cfg!(target_arch = "aarch64");
+    static FAST: LazyLock<bool> = LazyLock::new(|| {
+        #[cfg(target_arch = "x86_64")]
+        let has = std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma");
+        #[cfg(not(target_arch = "x86_64"))]
+        let has = cfg!(target_arch = "aarch64");
+        has && std::env::var_os("IMPASTO_PLAIN").is_none()
+    });
+    *FAST
 }
 
 #[inline(always)]

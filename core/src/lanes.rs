@@ -303,7 +303,7 @@ impl<const FMA: bool> Lane<FMA> {
         let f = Self(mantissa);
         let z = f * f;
         let tail = f.polynomial([
-            3.333_333_1e-1,
+            3.333_333e-1,
             -2.499_999_4e-1,
             2.000_071_5e-1,
             -1.666_805_7e-1,

@@ -18,7 +18,7 @@ const VIEW_RANGE: f64 = 0.35;
 /// φn lies between 0 and this, radians: its sign cannot be seen.
 const PHI_MAX: f64 = 0.7;
 /// Out-of-plane tilts that the search starts from, radians.
-const PHI_STARTS: [f64; 4] = [0.0, 0.03, 0.09, 0.2];
+const PHI_STARTS: [f64; 3] = [0.0, 0.04, 0.12];
 
 #[derive(Clone, Copy)]
 pub struct Tilts<const FMA: bool> {
@@ -169,14 +169,6 @@ impl<'a, M: Model, const FMA: bool> ShapeFit<'a, M, FMA> {
         Point { normal: normalise(self.normal(phi)), shape_log }
     }
 
-    /// The lobe at one light for a view tilted by θv in the arm's plane.
-    #[inline(always)]
-    fn lobe(&self, normal: [Lane<FMA>; 3], shape: Lane<FMA>, light: usize, theta_v: Lane<FMA>) -> Lane<FMA> {
-        let (sine, cosine) = sine_cosine(theta_v);
-        let at = Illumination::new(self.illuminations[light].light, [sine, Lane::splat(0.0), cosine]);
-        M::basis(normal, &[shape], &at, &self.optics).specular[0]
-    }
-
     #[inline(always)]
     fn quadratic_inline(&self, point: &Tilts<FMA>) -> Quadratic<FMA, 3> {
         let shape = point.shape_log.exp();
@@ -187,18 +179,21 @@ impl<'a, M: Model, const FMA: bool> ShapeFit<'a, M, FMA> {
         let dual_normal = array!(|i| Dual::<_, 2>::parameter(normal[i], 1, slope[i]));
         let (sine, cosine) = sine_cosine(point.view);
         let view = [sine, Lane::splat(0.0), cosine];
-        // The models carry no derivative by the view: central differences over a small part of the lobe's width serve.
-        let step = (shape * Lane::splat(0.02)).max(Lane::splat(3e-4)).min(Lane::splat(3e-3));
-        let per_step = Lane::splat(0.5) / step;
+        // The models carry no derivative by the view: a difference over a small part of the lobe's width serves, for the
+        // slopes only steer the steps.
+        let step = (shape * Lane::splat(0.01)).max(Lane::splat(2e-4)).min(Lane::splat(2e-3));
+        let per_step = Lane::splat(1.0) / step;
+        let (sine, cosine) = sine_cosine(point.view + step);
+        let view_ahead = [sine, Lane::splat(0.0), cosine];
 
         let mut quadratic = Quadratic::zero();
         quadratic.cost = self.constant;
-        for (light, remainder) in self.remainders.iter().enumerate() {
-            let at = Illumination::new(self.illuminations[light].light, view);
+        for (remainder, calibrated) in self.remainders.iter().zip(self.illuminations) {
+            let at = Illumination::new(calibrated.light, view);
             let lobe = M::basis(dual_normal, &[dual_shape], &at, &self.optics).specular[0];
-            let ahead = self.lobe(normal, shape, light, point.view + step);
-            let behind = self.lobe(normal, shape, light, point.view - step);
-            let slopes = [(ahead - behind) * per_step, lobe.derivative[0], lobe.derivative[1]];
+            let at_ahead = Illumination::new(at.light, view_ahead);
+            let ahead = M::basis(normal, &[shape], &at_ahead, &self.optics).specular[0];
+            let slopes = [(ahead - lobe.value) * per_step, lobe.derivative[0], lobe.derivative[1]];
             let residual = remainder.value - self.specular * lobe.value;
             quadratic.cost = (remainder.weight * residual).mul_add(residual, quadratic.cost);
             for p in 0..3 {
