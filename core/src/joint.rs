@@ -7,8 +7,11 @@ use crate::number::{Mask, Number, Real, array};
 use crate::observations::{Group, Stack};
 use crate::record::{FitGroup, Layout, Row, Status};
 use crate::separable::{Loss, Point, Scratch, Separable, Solution};
-use crate::start::{Grey, candidates, grey, start};
+use crate::start::{Grey, candidates, doubt_shadows, grey, start};
 use std::marker::PhantomData;
+
+/// Rounds of a robust fit with a wider loss before the one with the loss asked for.
+const ROBUST_STAGES: usize = 2;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
@@ -25,6 +28,8 @@ pub struct JointFit<'a, M, const FMA: bool, const C: usize, const P: usize> {
     colour: [Lane<FMA>; C],
     group: Group<FMA, C>,
     grey: Vec<Grey<FMA>>,
+    /// Share of each light's weight that its samples keep at the start of a robust fit.
+    kept: Vec<Lane<FMA>>,
     scratch: Scratch<FMA, C, P>,
     model: PhantomData<M>,
 }
@@ -47,6 +52,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> JointFit<'a,
             colour: array!(|k| Lane::splat(colour[k])),
             group: Group::new(stack),
             grey: Vec::with_capacity(stack.lights.len()),
+            kept: Vec::with_capacity(stack.lights.len()),
             scratch: Scratch::new(stack.lights.len()),
             model: PhantomData,
         }
@@ -65,7 +71,11 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize> FitGroup for Joi
         let wanted = !self.group.usable_lights.lt(Lane::splat(self.unknowns() as f64));
         let illuminations = &self.group.illuminations;
         let (optics, ambient) = (self.options.optics, self.options.ambient);
-        let begin =
+        let robust = self.options.loss != Loss::Linear;
+        if robust {
+            doubt_shadows(&mut self.grey, illuminations, &mut self.kept);
+        }
+        let mut begin =
             start::<M, FMA>(&candidates(&self.grey, illuminations), &self.grey, illuminations, &optics, ambient);
 
         let mut problem = Separable::<M, FMA, C, P>::new(
@@ -76,6 +86,15 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize> FitGroup for Joi
             ambient,
             &mut self.scratch,
         );
+        if robust {
+            problem.trust(&self.kept);
+            // Far from the minimum every sample is an outlier: the loss first takes the residuals for noise.
+            for _ in 0..ROBUST_STAGES {
+                problem.scale_loss(Some(&begin));
+                begin = minimise(&mut problem, &begin, wanted, self.options.max_steps).point;
+            }
+            problem.scale_loss(None);
+        }
         let mut outcome = minimise(&mut problem, &begin, wanted, self.options.max_steps);
         let mut solution = problem.solve(&outcome.point);
         // A lobe of magnitude 0 gives its shape no gradient, so a fit that comes there cannot leave. From the normal that it

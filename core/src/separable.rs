@@ -52,6 +52,8 @@ pub struct Separable<'a, M, const FMA: bool, const C: usize, const P: usize> {
     pub fixed_specular: Option<[Lane<FMA>; MAX_LOBES]>,
     /// 1 / degrees of freedom.
     per_freedom: Lane<FMA>,
+    /// The loss takes residuals this many times larger for noise.
+    loss_scale: Lane<FMA>,
     /// Factor of each sample's weight from the robust loss, refreshed at every accepted point.
     robust: Vec<[Lane<FMA>; C]>,
     basis: Vec<Basis<Dual<Lane<FMA>, P>>>,
@@ -147,6 +149,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
             colour,
             optics,
             loss,
+            loss_scale: Lane::splat(1.0),
             ambient,
             channels: group.channels,
             fixed_specular: None,
@@ -334,11 +337,12 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
         match self.loss {
             Loss::Linear => weight * residual * residual,
             Loss::Cauchy(k) => {
-                let k_squared = Lane::splat(f64::from(k * k));
+                let k = self.loss_scale * Lane::splat(f64::from(k));
+                let k_squared = k * k;
                 k_squared * (plain * residual * residual / k_squared).ln_1p()
             }
             Loss::Huber(k) => {
-                let k = Lane::splat(f64::from(k));
+                let k = self.loss_scale * Lane::splat(f64::from(k));
                 let squared = plain * residual * residual;
                 let linear = (k + k) * squared.sqrt() - k * k;
                 Lane::select(squared.lt(k * k), squared, linear)
@@ -360,6 +364,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
     #[inline(always)]
     fn reweight(&mut self, magnitudes: &Magnitudes<FMA, C>, mask: LaneMask) {
         let one = Lane::splat(1.0);
+        let scale_squared = self.loss_scale * self.loss_scale;
         for (light, observation) in self.observations.iter().enumerate() {
             let predicted = self.predicted(magnitudes, light);
             for k in 0..C {
@@ -367,12 +372,40 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
                 let squared = observation.weight[k] * residual * residual;
                 let factor = match self.loss {
                     Loss::Linear => one,
-                    Loss::Cauchy(s) => one / (one + squared / Lane::splat(f64::from(s * s))),
-                    Loss::Huber(s) => (Lane::splat(f64::from(s)) / squared.sqrt()).min(one),
+                    Loss::Cauchy(k) => one / (one + squared / (Lane::splat(f64::from(k * k)) * scale_squared)),
+                    Loss::Huber(k) => (Lane::splat(f64::from(k)) * self.loss_scale / squared.sqrt()).min(one),
                 };
                 self.robust[light][k] = Lane::select(mask, factor, self.robust[light][k]);
             }
         }
+    }
+
+    /// Gives the samples of each light only a share of their weight, until the loss has residuals to go by.
+    #[inline(always)]
+    pub fn trust(&mut self, share: &[Lane<FMA>]) {
+        for (robust, share) in self.robust.iter_mut().zip(share) {
+            *robust = [*share; C];
+        }
+    }
+
+    /// Sets the scale of the loss to the residuals' own at a point, by the samples that are trusted there, or back to 1.
+    #[inline(always)]
+    pub fn scale_loss(&mut self, point: Option<&Point<FMA>>) {
+        let one = Lane::splat(1.0);
+        self.loss_scale = one;
+        let Some(point) = point else { return };
+        let magnitudes = self.solve(point).magnitudes;
+        let (mut squares, mut trusted) = (Lane::splat(0.0), Lane::splat(1e-20));
+        for (light, observation) in self.observations.iter().enumerate() {
+            let predicted = self.predicted(&magnitudes, light);
+            for k in 0..C {
+                let share = Lane::select(observation.weight[k].positive(), self.robust[light][k], Lane::splat(0.0));
+                let residual = observation.radiance[k] - predicted[k];
+                squares = (share * observation.weight[k] * residual).mul_add(residual, squares);
+                trusted = trusted + share;
+            }
+        }
+        self.loss_scale = (squares / trusted).sqrt().max(one);
     }
 
     #[inline(always)]

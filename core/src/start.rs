@@ -59,9 +59,9 @@ fn highlight_normal<const FMA: bool>(grey: &[Grey<FMA>], illuminations: &[Illumi
 }
 
 /// Lambert's normal by linear least squares over samples away from the highlight that `previous` would have, in Cauchy's
-/// norm, so that shadows and what is left of the highlight do not pull.
+/// norm, so that shadows and what is left of the highlight do not pull. The normal is multiplied by the albedo.
 #[inline(always)]
-pub fn diffuse_normal<const FMA: bool>(
+fn scaled_normal<const FMA: bool>(
     grey: &[Grey<FMA>],
     illuminations: &[Illumination<Lane<FMA>>],
     rounds: usize,
@@ -100,7 +100,38 @@ pub fn diffuse_normal<const FMA: bool>(
         scaled_normal = solve_symmetric(matrix, right);
         normal = bounded(scaled_normal);
     }
-    normal
+    scaled_normal
+}
+
+/// Lambert's normal by `rounds` of reweighted linear least squares.
+#[inline(always)]
+pub fn diffuse_normal<const FMA: bool>(
+    grey: &[Grey<FMA>],
+    illuminations: &[Illumination<Lane<FMA>>],
+    rounds: usize,
+) -> [Lane<FMA>; 3] {
+    bounded(scaled_normal(grey, illuminations, rounds))
+}
+
+/// Takes weight from samples that are darker than the diffuse light around them explains: cast shadows. A robust loss would
+/// find them too, but not from a start that they have spoilt. Returns the share of weight that each light keeps.
+#[inline(always)]
+pub fn doubt_shadows<const FMA: bool>(
+    grey: &mut [Grey<FMA>],
+    illuminations: &[Illumination<Lane<FMA>>],
+    kept: &mut Vec<Lane<FMA>>,
+) {
+    let zero = Lane::splat(0.0);
+    let scaled = scaled_normal(grey, illuminations, 8);
+    kept.clear();
+    for (sample, at) in grey.iter_mut().zip(illuminations) {
+        let expected = dot(scaled, at.light).max(zero);
+        // A tenth darker than expected halves the weight.
+        let missing = (expected - sample.radiance).max(zero) / (expected * Lane::splat(0.1)).max(Lane::splat(1e-20));
+        let share = Lane::splat(1.0) / missing.mul_add(missing, Lane::splat(1.0));
+        sample.weight = sample.weight * share;
+        kept.push(share);
+    }
 }
 
 /// Two normals that the fit may start from: where the diffuse light puts it, and where the highlight does.
