@@ -35,6 +35,7 @@ _TITLES = {
     "shininess": "Shininess",
     "chi2_reduced": "Reduced chi-square",
     "residual_rms": "Residual",
+    "view_tilt": "Tilt of the view that suits the highlight",
     "status": "How the fit of each pixel ended",
 }
 _LABELS = {
@@ -44,6 +45,7 @@ _LABELS = {
     "shininess": "shininess (large is glossy)",
     "chi2_reduced": "reduced chi-square",
     "residual_rms": "RMS residual, relative radiance",
+    "view_tilt": "θv in the arm's plane, radians",
 }
 _LOGARITHMIC = {"specular", "shininess", "c", "m", "chi2_reduced", "residual_rms"}
 _COLOURS = {"diffuse", "ambient"}
@@ -229,6 +231,9 @@ class _MapWriter:
         if self._name in ("c", "diffuse") and not (self._preview > 1).any():
             return 0.0, 1.0
         finite = self._preview[np.isfinite(self._preview)]
+        if self._name == "view_tilt":
+            side = float(np.abs(finite).max()) if finite.size else 1.0
+            return -side, side
         high = float(np.percentile(finite, 99.9)) if finite.size else 1.0
         return 0.0, high if high > 0 else 1.0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -103,7 +104,10 @@ class Paper:
                 lights_needed(self._model),
             )
         view_phi = float(direction_tilts(self._arm_camera.view_direction)[1])
-        reach = normal_reach(grid, self._arm_lights.direction, self._stack.noise)
+        diffuse = self._fit(width_model, found.grid, replace(some, specular=float("nan")))
+        reach = normal_reach(
+            grid, diffuse, light_direction=self._arm_lights.direction, noise=self._stack.noise
+        )
         crossing = Crossing(view_phi, reach, apparent.shape)
         threshold = float(np.radians(threshold_deg))
         specular = self._specular(found, pixel, threshold)

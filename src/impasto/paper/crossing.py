@@ -55,15 +55,16 @@ class Crossing:
         return self.offset <= _LARGEST_OFFSET * self.c
 
 
-def normal_reach(maps: Maps, light_direction: Array, noise: tuple[float, float, float]) -> float:
+def normal_reach(*fits: Maps, light_direction: Array, noise: tuple[float, float, float]) -> float:
     """Return how far the normals of a sample tilt, from their spread in the arm's plane.
 
     Relief is taken to be as steep across the arm as along it.
 
     Parameters
     ----------
-    maps : dict of str to ndarray of shape (N[, k])
-        A fit of some pixels of the sample.
+    fits : dict of str to ndarray of shape (N[, k])
+        Fits of some pixels of the sample; what makes one of them err, such as tails of highlights or a
+        highlight in another colour, the other may bear, so the one with the smaller spread counts.
     light_direction : ndarray of shape (L, 3)
     noise : tuple of float
         (read, photon, relative), see `store.Stack.noise`.
@@ -73,13 +74,16 @@ def normal_reach(maps: Maps, light_direction: Array, noise: tuple[float, float, 
     float
         Radians: the 99th percentile of |θn − its median|, less what the noise explains.
     """
-    converged = maps["status"] == 0
-    if not converged.any():
+    return min(_reach(maps, light_direction, noise) for maps in fits)
+
+
+def _reach(maps: Maps, light_direction: Array, noise: tuple[float, float, float]) -> float:
+    fitted = np.isfinite(maps["normal"]).all(axis=-1)
+    if not fitted.any():
         return 0.0
-    normal = maps["normal"][converged].astype(np.float64)
-    theta, _ = direction_tilts(normal)
+    theta, _ = direction_tilts(maps["normal"][fitted])
     spread = np.quantile(np.abs(theta - np.median(theta)), _QUANTILE)
-    sigma = _theta_sd(theta, maps["diffuse"][converged].astype(np.float64), light_direction, noise)
+    sigma = _theta_sd(theta, maps["diffuse"][fitted].astype(np.float64), light_direction, noise)
     return float(np.sqrt(max(0.0, spread**2 - (_QUANTILE_SIGMAS * sigma) ** 2)))
 
 

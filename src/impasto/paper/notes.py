@@ -111,6 +111,6 @@ def clipped(pixels: int, of_all: int) -> tuple[str, ...]:
 def theta_error(error_deg: float) -> str:
     """Say how large the error of θn is, as θv tells it."""
     return (
-        f"the error of θn is about {error_deg:.2f}°: half the standard deviation of θv, which takes up what "
-        "the diffuse stage got wrong"
+        f"the error of θn, as θv tells it, is about {error_deg:.2f}°: half its standard deviation, because "
+        "it takes up what the diffuse stage got wrong; weak and broad highlights make it look larger"
     )
