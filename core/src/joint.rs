@@ -108,7 +108,7 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize> FitGroup for Joi
             outcome.converged = (outcome.converged & !better) | (retried.converged & better);
             solution = problem.solve(&outcome.point);
         }
-        let summary = summarise(&problem, &solution);
+        let summary = summarise(&problem, &solution, &self.group.irradiance);
         let at_bound = problem.at_bound(&outcome.point, &solution.magnitudes);
         let deviations = Deviations::new::<P>(M::LOBES, &solution, summary.chi2_reduced);
         problem.give_back(&mut self.scratch);
@@ -158,6 +158,7 @@ struct Summary<const FMA: bool> {
 fn summarise<M: Model, const FMA: bool, const C: usize, const P: usize>(
     problem: &Separable<'_, M, FMA, C, P>,
     solution: &Solution<FMA, C, P>,
+    irradiance: &[[Lane<FMA>; C]],
 ) -> Summary<FMA> {
     let (zero, one) = (Lane::splat(0.0), Lane::splat(1.0));
     let mut samples = zero;
@@ -167,7 +168,7 @@ fn summarise<M: Model, const FMA: bool, const C: usize, const P: usize>(
         let predicted = problem.predicted(&solution.magnitudes, light);
         for k in 0..C {
             let residual = observation.radiance[k] - predicted[k];
-            let measured = residual * observation.irradiance[k];
+            let measured = residual * irradiance[light][k];
             let usable = observation.weight[k].positive();
             samples = samples + Lane::select(usable, one, zero);
             squares = squares + Lane::select(usable, measured * measured, zero);

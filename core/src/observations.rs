@@ -78,8 +78,6 @@ pub struct Observation<const FMA: bool, const C: usize> {
     pub radiance: [Lane<FMA>; C],
     /// Inverse variance; 0 for a sample that is clipped, in shadow or missing.
     pub weight: [Lane<FMA>; C],
-    /// The irradiance that the radiance was divided by.
-    pub irradiance: [Lane<FMA>; C],
 }
 
 /// Everything known of a group of eight pixels. The buffers are reused from group to group.
@@ -87,6 +85,8 @@ pub struct Group<const FMA: bool, const C: usize> {
     /// Channels that the stack has, at most C; the others have no weight.
     pub channels: usize,
     pub observations: Vec<Observation<FMA, C>>,
+    /// The irradiance that each light's radiance was divided by.
+    pub irradiance: Vec<[Lane<FMA>; C]>,
     pub illuminations: Vec<Illumination<Lane<FMA>>>,
     /// Lights with at least one usable sample, per pixel.
     pub usable_lights: Lane<FMA>,
@@ -99,10 +99,11 @@ pub struct Group<const FMA: bool, const C: usize> {
 impl<const FMA: bool, const C: usize> Group<FMA, C> {
     pub fn new(stack: &Stack) -> Self {
         let zero = [Lane::splat(0.0); C];
-        let observation = Observation { radiance: zero, weight: zero, irradiance: zero };
+        let observation = Observation { radiance: zero, weight: zero };
         let mut group = Group {
             channels: stack.channels,
             observations: vec![observation; stack.lights.len()],
+            irradiance: vec![zero; stack.lights.len()],
             illuminations: Vec::with_capacity(stack.lights.len()),
             usable_lights: Lane::splat(0.0),
             usable_samples: Lane::splat(0.0),
@@ -122,7 +123,7 @@ impl<const FMA: bool, const C: usize> Group<FMA, C> {
             self.illuminations.push(Illumination::new(direction, view));
             for channel in 0..stack.channels {
                 let intensity = Lane([stack.intensity[light * stack.channels + channel]; LANES]);
-                self.observations[light].irradiance[channel] = intensity * falloff;
+                self.irradiance[light][channel] = intensity * falloff;
             }
         }
     }
@@ -160,7 +161,7 @@ impl<const FMA: bool, const C: usize> Group<FMA, C> {
                 let radiance = Lane::select(missing, zero, value);
                 let positive = radiance.max(zero);
                 let variance = positive.mul_add(positive.mul_add(relative_variance, photon), read_variance);
-                let irradiance = observation.irradiance[channel];
+                let irradiance = self.irradiance[light][channel];
                 observation.radiance[channel] = radiance / irradiance;
                 observation.weight[channel] = Lane::select(usable, irradiance * irradiance / variance, zero);
                 any_usable = any_usable | usable;

@@ -186,7 +186,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
     #[inline(always)]
     fn refine(&mut self, diffuse: &Diffuse<FMA, C>) -> Shape<FMA, C> {
         let optics = self.options.optics;
-        let specular = [Lane::splat(self.sample.specular), Lane::splat(0.0)];
+        let specular = [Lane::splat(self.sample.specular)];
         let begin = {
             let problem = ShapeFit::<M, FMA>::new(
                 &self.group,

@@ -17,7 +17,7 @@ use crate::geometry::Illumination;
 use crate::number::Number;
 
 /// The largest number of specular lobes and of shape parameters of any model.
-pub const MAX_LOBES: usize = 2;
+pub const MAX_LOBES: usize = 1;
 pub const MAX_SHAPE: usize = 3;
 /// The largest number of shapes that a fit starts from.
 pub const MAX_STARTS: usize = 8;

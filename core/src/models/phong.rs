@@ -48,6 +48,6 @@ impl Model for Phong {
         let lit = visible & half_chord.value().lt(N::Real::splat(1.0));
         let cosine_minus_one = -N::select(lit, half_chord, zero);
         let lobe = (shape[0] * cosine_minus_one.ln_1p()).exp();
-        Basis { diffuse: N::select(visible, normal_light, zero), specular: [N::select(lit, lobe, zero), zero] }
+        Basis { diffuse: N::select(visible, normal_light, zero), specular: [N::select(lit, lobe, zero)] }
     }
 }

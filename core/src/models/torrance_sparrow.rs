@@ -35,6 +35,6 @@ impl<D: Distribution, G: Masking> Model for TorranceSparrow<D, G> {
             FresnelAngle::Facet => lobe.scale(fresnel(at.light_half, optics.index)),
             FresnelAngle::Element => lobe * fresnel(normal_light, optics.index),
         };
-        Basis { diffuse: N::select(visible, normal_light, zero), specular: [N::select(visible, lobe, zero), zero] }
+        Basis { diffuse: N::select(visible, normal_light, zero), specular: [N::select(visible, lobe, zero)] }
     }
 }
