@@ -166,7 +166,9 @@ def test_an_interrupted_stack_is_continued_to_the_same_bytes(tmp_path, monkeypat
 
 def test_a_photograph_that_changed_meanwhile_is_decoded_again(tmp_path, monkeypatch):
     folder = write_capture(tmp_path / "photos", noise_images(3, 40, 30))
-    monkeypatch.setattr(stores.StackWriter, "finish", lambda self: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(
+        stores.StackWriter, "finish", lambda self, more: (_ for _ in ()).throw(KeyboardInterrupt)
+    )
     with pytest.raises(KeyboardInterrupt):
         stack(folder, tmp_path / "s.zarr")
     monkeypatch.undo()

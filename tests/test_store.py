@@ -53,7 +53,7 @@ def make_stack(path, pixels, **changed):
         for row in range(0, image.shape[0], stores.STACK_CHUNK):
             writer.write_band(light, row, image[row : row + stores.STACK_CHUNK])
         writer.finish_light(light, f"{light:064d}", light)
-    writer.finish()
+    writer.finish({})
     return lights
 
 
@@ -106,7 +106,7 @@ def test_lights_camera_and_attributes_are_read_as_written(painting):
     np.testing.assert_array_equal(stack.clip_level, [0.98, 0.98, np.inf])
     assert stack.noise == (1e-4, 2e-5, 5e-3)
     assert stack.clipped_samples == 0 + 1 + 2 + 3
-    assert stack.light_rgb is None
+    assert stack.light_rgb.tolist() == [1.0, 1.0, 1.0]
 
 
 def test_float_stacks_keep_missing_samples(tmp_path, rng):

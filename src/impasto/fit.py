@@ -239,9 +239,12 @@ def _unknown_names(stack: stores.Stack, options: FitOptions) -> list[Problem]:
 
 
 def _notes(stack: stores.Stack) -> tuple[str, ...]:
-    if stack.light_rgb is None:
-        return ("the light's colour is not known: the specular term is taken to be neutral in the stack",)
-    return ()
+    if stack.shape[3] == 1:
+        return ()
+    colour = " ".join(f"{value:g}" for value in stack.light_rgb)
+    return (
+        f"the specular term has the colour of the light, {colour} in the stack ({stack.light_rgb_source})",
+    )
 
 
 class _Job:

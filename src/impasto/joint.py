@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from impasto import store as stores
@@ -45,7 +44,7 @@ class Joint:
         self.lights = [number for number, name in enumerate(names) if name not in options.exclude]
         self._selected = stack.lights.select(self.lights)
         self._camera = stack.camera
-        self._light_rgb = np.ones(channels) if stack.light_rgb is None else stack.light_rgb
+        self._light_rgb = stack.light_rgb
         self.maps = stores.fit_maps(
             model.shape_names, lobes=model.lobes, ambient=model.ambient, channels=channels
         )
@@ -83,7 +82,7 @@ class Joint:
             "procedure": self.name,
             **self._options.attributes(_FOREIGN),
             "light_rgb": self._light_rgb.tolist(),
-            "light_rgb_source": "assumed white" if self._stack.light_rgb is None else "stack",
+            "light_rgb_source": self._stack.light_rgb_source,
             "stack_sha256": self._stack.sha256,
             "photographs": len(self.lights),
         }

@@ -17,6 +17,7 @@ import numpy as np
 from impasto import store as stores
 from impasto.capture import Capture, Photograph, read_capture
 from impasto.errors import CaptureError, Problem, StoreError, raise_problems
+from impasto.light_colour import light_colour
 from impasto.linearise import Linearisation, linearisations
 from impasto.progress import progress
 
@@ -132,7 +133,7 @@ def stack(
             raise_problems(StoreError, _room(path, job))
             kept = job.write(stores.StackWriter(path, job.header, fresh=fresh))
         log.write("summary", decoded=len(capture.photographs) - kept, decoders=job.decoders)
-    inputs = stores.open_stack(path).attributes["inputs"]
+    written = stores.open_stack(path).attributes
     _, height, width, channels = job.header.shape
     return StackSummary(
         store=path,
@@ -144,10 +145,10 @@ def stack(
         decoded=len(capture.photographs) - kept,
         kept=kept,
         already=already,
-        clipped_samples={entry["name"]: entry["clipped_samples"] for entry in inputs},
+        clipped_samples={entry["name"]: entry["clipped_samples"] for entry in written["inputs"]},
         decoders=job.decoders,
         seconds=time.perf_counter() - started,
-        notes=capture.notes,
+        notes=tuple(written["notes"]),
     )
 
 
@@ -262,8 +263,15 @@ class _Job:
                 except CaptureError as error:
                     problems[light] = error.problems
         raise_problems(CaptureError, [problem for light in sorted(problems) for problem in problems[light]])
-        writer.finish()
+        writer.finish(self._light_colour(writer))
         return kept
+
+    def _light_colour(self, writer: stores.StackWriter) -> dict[str, Any]:
+        """Return what the highlights of the photographs, all written, tell about the light."""
+        written = stores.read_group(writer.store / stores.STACK) or {}
+        colour = light_colour(stores.Stack(writer.store, written))
+        notes = [*self.capture.notes, *([colour.note] if colour.note else [])]
+        return {"light_rgb": list(colour.rgb), "light_rgb_source": colour.source, "notes": notes}
 
     def _in_parallel(self, function: Callable[[int], Result]) -> Iterator[tuple[int, Future[Result]]]:
         """Call `function` with each photograph's number in threads; yield number and outcome as they come.

@@ -60,7 +60,7 @@ class Paper:
         self._arm = find_arm(selected.direction)
         self._arm_lights = self._arm.lights(selected)
         self._arm_camera = self._arm.camera(stack.camera)
-        self._light_rgb = np.ones(channels) if stack.light_rgb is None else stack.light_rgb
+        self._light_rgb = stack.light_rgb
         self._sample: Sample | None = None
         self.maps = _maps(model, channels, refined=options.refined)
         raise_problems(
@@ -79,7 +79,7 @@ class Paper:
             "procedure": self.name,
             **self._options.attributes(_FOREIGN),
             "light_rgb": self._light_rgb.tolist(),
-            "light_rgb_source": "assumed white" if self._stack.light_rgb is None else "stack",
+            "light_rgb_source": self._stack.light_rgb_source,
             "stack_sha256": self._stack.sha256,
             "photographs": len(self.lights),
         }

@@ -110,9 +110,8 @@ class _Peak:
         self._scale, self._offset = np.float32(stack.scale), np.float32(stack.offset)
         self._clip_level = stack.clip_level.astype(np.float32)
         channels = stack.shape[3]
-        light_rgb = np.ones(channels) if stack.light_rgb is None else stack.light_rgb
         intensity = stack.lights.intensity[np.asarray(lights)]
-        self._per_radiance = 1.0 / (intensity * light_rgb * channels)
+        self._per_radiance = 1.0 / (intensity * stack.light_rgb * channels)
         self._brightest = -np.inf
         self.place = (-1, -1, -1)
         self.values: NDArray[Any] | None = None

@@ -24,6 +24,7 @@ from impasto.store.hierarchy import (
     target_problems,
 )
 from impasto.store.layout import (
+    ASSUMED_WHITE,
     PYRAMIDS,
     SCHEMA,
     STACK,
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from xarray import DataTree
 
 __all__ = [
+    "ASSUMED_WHITE",
     "PYRAMIDS",
     "SCHEMA",
     "STACK",

@@ -26,6 +26,9 @@ INNER_CHUNK = 256
 # Levels stop where a picture fits on a screen at once.
 SMALLEST_LEVEL = 512
 
+# What the attribute `light_rgb_source` says where the light's colour is not known.
+ASSUMED_WHITE = "assumed white"
+
 STATUS_MEANING = {
     0: "converged",
     1: "step limit",

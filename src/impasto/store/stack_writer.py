@@ -212,8 +212,8 @@ class StackWriter:
                 entry.update(sha256=sha256, clipped_samples=clipped_samples)
                 write_group(self.store, STACK, self._attributes)
 
-    def finish(self) -> None:
-        """Declare the stack complete.
+    def finish(self, more: Mapping[str, Any]) -> None:
+        """Declare the stack complete, and add attributes that were not known before.
 
         Raises
         ------
@@ -223,6 +223,7 @@ class StackWriter:
         missing = [entry["name"] for entry in self._attributes["inputs"] if entry["sha256"] is None]
         if missing:
             raise StoreError(unfinished_stack(self.store, self._attributes))
+        self._attributes.update(more)
         self._attributes["complete"] = True
         write_group(self.store, STACK, self._attributes)
 

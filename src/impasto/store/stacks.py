@@ -15,7 +15,7 @@ from impasto.errors import Problem, StoreError
 from impasto.geometry import Camera, Lights
 from impasto.store.files import digest, reading
 from impasto.store.hierarchy import Attributes, has_array, open_array, read_group, source_problems
-from impasto.store.layout import STACK
+from impasto.store.layout import ASSUMED_WHITE, STACK
 from impasto.store.stack_writer import unfinished_stack
 
 if TYPE_CHECKING:
@@ -102,10 +102,14 @@ class Stack:
         return float(noise["read"]), float(noise["photon"]), float(noise["relative"])
 
     @property
-    def light_rgb(self) -> NDArray[np.float64] | None:
-        """Colour of the light in the stack's own space, shape (C,), if it was measured."""
-        colour = self.attributes.get("light_rgb")
-        return None if colour is None else np.array(colour, np.float64)
+    def light_rgb(self) -> NDArray[np.float64]:
+        """Colour of the light in the stack's own space, shape (C,); ones where it is not known."""
+        return np.array(self.attributes.get("light_rgb", [1.0] * self.shape[3]), np.float64)
+
+    @property
+    def light_rgb_source(self) -> str:
+        """Where that colour comes from."""
+        return str(self.attributes.get("light_rgb_source", ASSUMED_WHITE))
 
     @property
     def sha256(self) -> str:

@@ -1,0 +1,265 @@
+"""Estimate the colour of the light from the highlights of a stack."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impasto import store as stores
+from impasto.geometry import pixel_position_mm
+from impasto.highlights import Array, Highlights, separate
+
+# Pixels looked at, in a lattice on chunks spread over the painting; fewer where lights are many.
+_PIXELS = 8192
+_SAMPLES = 1 << 20
+_CHUNKS_ACROSS = 3
+_LIGHTS_AT_ONCE = 8
+
+# Pixels whose diffuse colours differ by less than this (natural logarithm) count as one paint.
+_PAINT_WIDTH = 0.15
+_PAINT_PIXELS = 8
+
+# How a paint's highlights may be off, in natural logarithms: any way, by this; towards the paint's own
+# colour, by this share of the way, because its diffuse reflection is not quite Lambert's; and by this where
+# that colour is within `_TELLING` of the light's, because a metal looks so too.
+_ANY_WAY = 0.02
+_TOWARDS_PAINT = 0.25
+_METAL = 0.5
+_TELLING = 0.15
+# Paints further off than this many standard deviations have no say.
+_CUT = 3.0
+# Two meeting points whose shares of the votes differ by less than this are as good as each other.
+_AS_GOOD = 0.06
+
+_STEPS = 40
+_STEP_END = 1e-5
+
+# What an estimate needs: this much of the paints behind it, and a standard deviation below this.
+_LEAST_SUPPORT = 0.4
+_LARGEST_SD = 0.025
+# An estimate that is not further than this many standard deviations from neutral is neutral.
+_SIGNIFICANT = 4.0
+
+# Orthonormal coordinates of the logarithms of a colour, whatever its brightness.
+_PLANE = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.0]])
+
+
+@dataclass(frozen=True)
+class LightColour:
+    """The colour of the light in the stack's own space.
+
+    Parameters
+    ----------
+    rgb : tuple of float
+        One per channel; their mean is 1.
+    source : str
+        ``estimated from N highlights`` or ``assumed white``.
+    note : str
+        The same in a sentence, with the reason; "" where there is nothing to say.
+    """
+
+    rgb: tuple[float, ...]
+    source: str
+    note: str
+
+
+def light_colour(stack: stores.Stack) -> LightColour:
+    """Estimate the colour of the light from the highlights of a stack.
+
+    Parameters
+    ----------
+    stack : Stack
+
+    Returns
+    -------
+    LightColour
+        White where there is too little evidence, or where it does not contradict white. The same stack gives
+        the same colour.
+
+    Raises
+    ------
+    StoreError
+        If the stack is damaged.
+
+    Notes
+    -----
+    By the dichromatic model [Shafer1985]_, what the highlights of a paint add to its diffuse colour has the
+    colour of the light. An error of the diffuse part moves it along the line between the two in the plane of
+    chromaticities, and so does a metal, which colours its highlights; the lines of several paints meet in the
+    light's colour [Lee1986]_. Each paint has one vote in proportion to the square root of its pixels, the
+    votes are combined by Tukey's biweight, and what one paint alone says does not suffice.
+    """
+    channels = stack.shape[3]
+    if channels != 3:
+        return LightColour((1.0,) * channels, stores.ASSUMED_WHITE, "")
+    return from_highlights(_highlights(stack))
+
+
+def from_highlights(highlights: Highlights) -> LightColour:
+    """Estimate the colour of the light from separated highlights of three channels; see `light_colour`."""
+    found, body, votes = _paints(highlights)
+    if len(votes) < 3:
+        return _white(f"only {len(highlights.excess)} sampled pixels, of too few paints, have a highlight")
+    colour, covariance, support, near = _meeting_point(found, body, votes)
+    deviation = math.sqrt(np.linalg.eigvalsh(covariance)[-1])
+    if support < _LEAST_SUPPORT:
+        return _white("the highlights of the sampled pixels do not agree on one")
+    if deviation > _LARGEST_SD:
+        return _white(f"the paints with highlights are too few or too alike to tell it ({deviation:.0%})")
+    count = int(votes[near].sum())
+    source = f"estimated from {count} highlights"
+    if colour @ np.linalg.solve(covariance, colour) < _SIGNIFICANT**2:
+        return LightColour(
+            (1.0, 1.0, 1.0), source, f"the light is neutral in the photographs, as {count} highlights tell"
+        )
+    rgb = np.exp(colour @ _PLANE)
+    # Rounded so that no other order of additions, as on another processor, shows.
+    red, green, blue = (round(float(value), 4) for value in rgb / rgb.mean())
+    return LightColour(
+        (red, green, blue),
+        source,
+        f"the light's colour in the photographs, and so that of the specular term, is "
+        f"{red:.3f}, {green:.3f}, {blue:.3f} (R, G, B, within about {deviation:.1%}), {source}",
+    )
+
+
+def _white(reason: str) -> LightColour:
+    note = f"the light is taken to be neutral in the photographs: {reason}"
+    return LightColour((1.0, 1.0, 1.0), stores.ASSUMED_WHITE, note)
+
+
+def _highlights(stack: stores.Stack) -> Highlights:
+    """Separate the highlights of pixels all over the painting."""
+    lights, height, width, channels = stack.shape
+    chunks = [(rows, columns) for rows in _spread(height) for columns in _spread(width)]
+    pixels = sum((rows.stop - rows.start) * (columns.stop - columns.start) for rows, columns in chunks)
+    wanted = min(_PIXELS, max(_PIXELS // 8, _SAMPLES // lights))
+    step = math.ceil(math.sqrt(pixels / wanted))
+    lattice = slice(step // 2, None, step)
+    radiance = np.concatenate([_read(stack, *chunk, lattice) for chunk in chunks])
+    light = _light_vectors(stack, chunks, lattice)
+    usable = (np.isfinite(radiance) & (radiance < stack.clip_level)).all(axis=-1)
+    radiance /= np.broadcast_to(stack.lights.intensity, (lights, channels))
+    return separate(radiance, usable, light, stack.noise[0])
+
+
+def _spread(length: int) -> list[slice]:
+    """Return rows, or columns, of up to three chunks, spread evenly over the painting."""
+    size = stores.STACK_CHUNK
+    count = -(-length // size)
+    chosen = sorted({round(chunk) for chunk in np.linspace(0, count - 1, min(count, _CHUNKS_ACROSS))})
+    return [slice(chunk * size, min((chunk + 1) * size, length)) for chunk in chosen]
+
+
+def _read(stack: stores.Stack, rows: slice, columns: slice, lattice: slice) -> Array:
+    """Return relative radiance on a lattice in a chunk, shape (N, L, C), a few lights at a time."""
+    lights, _, _, channels = stack.shape
+    parts = [
+        stack.read(rows, columns, range(first, min(first + _LIGHTS_AT_ONCE, lights)))[:, lattice, lattice]
+        for first in range(0, lights, _LIGHTS_AT_ONCE)
+    ]
+    values = np.concatenate(parts).reshape(lights, -1, channels).swapaxes(0, 1)
+    return values * np.float64(stack.scale) + stack.offset
+
+
+def _light_vectors(stack: stores.Stack, chunks: list[tuple[slice, slice]], lattice: slice) -> Array:
+    """Return direction times relative irradiance of each light, shape (N or 1, L, 3)."""
+    lights, mm_per_px = stack.lights, stack.camera.mm_per_px
+    direction = lights.direction[np.newaxis]
+    if not lights.near or mm_per_px is None:
+        return direction
+    _, height, width, _ = stack.shape
+    parts = []
+    for rows, columns in chunks:
+        position = pixel_position_mm(rows, columns, height, width, mm_per_px)
+        grid = position.reshape(rows.stop - rows.start, columns.stop - columns.start, 2)
+        parts.append(grid[lattice, lattice].reshape(-1, 2))
+    on_painting = np.pad(np.concatenate(parts), ((0, 0), (0, 1)))
+    away = lights.position_mm - on_painting[:, np.newaxis]
+    distance = np.linalg.norm(away, axis=-1, keepdims=True)
+    at_centre = np.linalg.norm(lights.position_mm, axis=-1)[:, np.newaxis]
+    return np.where(np.isfinite(distance), away * at_centre**2 / distance**3, direction)
+
+
+def _paints(highlights: Highlights) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Sort pixels by their diffuse colour.
+
+    Returns
+    -------
+    found, body : ndarray of shape (K, 2), float64
+        Per paint, the colour of the highlights and of the diffuse part, in the coordinates of `_PLANE`.
+    count : ndarray of shape (K,), int
+        Pixels of the paint.
+    """
+    found = np.log(highlights.excess) @ _PLANE.T
+    body = np.log(highlights.diffuse) @ _PLANE.T
+    _, paint = np.unique(np.floor(body / _PAINT_WIDTH), axis=0, return_inverse=True)
+    paint = paint.ravel()
+    count = np.bincount(paint)
+    common = np.flatnonzero(count >= _PAINT_PIXELS)
+    medians = [
+        np.reshape([np.median(colour[paint == number], axis=0) for number in common], (-1, 2))
+        for colour in (found, body)
+    ]
+    return medians[0], medians[1], count[common]
+
+
+def _meeting_point(
+    found: Array, body: Array, count: NDArray[np.intp]
+) -> tuple[Array, Array, float, NDArray[np.bool_]]:
+    """Find where the lines of most paints meet.
+
+    Returns
+    -------
+    colour : ndarray of shape (2,)
+    covariance : ndarray of shape (2, 2)
+    support : float
+        Share of the votes behind it, 0 to 1.
+    near : ndarray of shape (K,), bool
+        The paints that have a say.
+    """
+    votes = np.sqrt(count) / np.sqrt(count).sum()
+    # White is tried before all others, and so is taken of two that are as good.
+    points = [_climb(start, found, body) for start in (np.zeros(2), *found)]
+    weights = [_weigh(point, found, body) for point in points]
+    supports = np.array([(votes * weight**1.5).sum() for weight, _, _ in weights])
+    best = int(np.flatnonzero(supports > supports.max() - 1e-9)[0])
+    weight, precision, distance2 = weights[best]
+    information = (weight[:, None, None] * precision).sum(axis=0)
+    covariance = np.linalg.inv(information + 1e-9 * np.eye(2))
+    # Points nearly as good say how far the choice between them is arbitrary.
+    rivals = np.array(points)[supports > supports[best] - _AS_GOOD] - points[best]
+    apart = rivals[np.argmax((rivals**2).sum(axis=1))]
+    covariance += np.outer(apart, apart) / 4
+    return points[best], covariance, float(supports[best]), distance2 < _CUT**2
+
+
+def _climb(start: Array, found: Array, body: Array) -> Array:
+    """Return the meeting point that reweighted least squares reach from `start`."""
+    colour = start
+    for _ in range(_STEPS):
+        weight, precision, _ = _weigh(colour, found, body)
+        if not weight.any():
+            break
+        information = (weight[:, None, None] * precision).sum(axis=0)
+        pull = (weight[:, None, None] * precision @ found[..., None]).sum(axis=0)[:, 0]
+        before, colour = colour, np.linalg.solve(information, pull)
+        if np.abs(colour - before).max() < _STEP_END:
+            break
+    return colour
+
+
+def _weigh(colour: Array, found: Array, body: Array) -> tuple[Array, Array, Array]:
+    """Return weight, precision (2 x 2), and squared distance in standard deviations, of each paint."""
+    towards = body - colour
+    length2 = (towards**2).sum(axis=-1)
+    any_way = _ANY_WAY**2 + _METAL**2 * np.exp(-length2 / _TELLING**2)
+    along = _TOWARDS_PAINT**2 / (any_way + _TOWARDS_PAINT**2 * length2)
+    outer = towards[:, :, None] * towards[:, None, :]
+    precision = (np.eye(2) - along[:, None, None] * outer) / any_way[:, None, None]
+    off = found - colour
+    distance2 = (off[:, None, :] @ precision @ off[:, :, None])[:, 0, 0]
+    return np.maximum(0.0, 1.0 - distance2 / _CUT**2) ** 2, precision, distance2
