@@ -4,6 +4,8 @@
 //! light. The basis functions `diffuse` and `specular_j` depend on the normal, the shape parameters and the directions of
 //! light and view; a model is these functions. The magnitudes Ad, As and Ae are linear and no business of the model.
 
+#[cfg(test)]
+mod golden_tests;
 mod lambert;
 pub mod microfacet;
 mod phong;

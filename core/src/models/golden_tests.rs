@@ -1,0 +1,122 @@
+//! Every model against the golden values that Python and the viewer's shader are held to as well, and its derivatives
+//! against differences.
+
+use super::{FresnelAngle, MAX_SHAPE, Model, Optics};
+use crate::dual::Dual;
+use crate::geometry::{Illumination, normalise};
+use crate::lanes::{LANES, Lane};
+use crate::number::Number;
+use serde_json::Value;
+
+const FILES: [&str; 3] = [
+    include_str!("../../../tests/golden/hand.json"),
+    include_str!("../../../tests/golden/lobes.json"),
+    include_str!("../../../tests/golden/mitsuba.json"),
+];
+
+struct Case {
+    normal: [f64; 3],
+    light: [f64; 3],
+    view: [f64; 3],
+    shape: [f64; MAX_SHAPE],
+    optics: Optics,
+    diffuse: f64,
+    specular: f64,
+}
+
+fn vector(value: &Value) -> [f64; 3] {
+    std::array::from_fn(|i| value[i].as_f64().unwrap())
+}
+
+fn cases(name: &str) -> Vec<Case> {
+    let files = FILES.map(|text| serde_json::from_str::<Value>(text).unwrap());
+    let all = files.iter().flat_map(|file| file["cases"].as_array().unwrap());
+    all.filter(|case| case["model"] == name)
+        .map(|case| Case {
+            normal: vector(&case["normal"]),
+            light: vector(&case["light"]),
+            view: vector(&case["view"]),
+            shape: std::array::from_fn(|i| case["shape"].get(i).map_or(1.0, |value| value.as_f64().unwrap())),
+            optics: Optics {
+                index: case["index"].as_f64().unwrap(),
+                fresnel: if case["fresnel"] == "element" { FresnelAngle::Element } else { FresnelAngle::Facet },
+            },
+            diffuse: case["diffuse_basis"].as_f64().unwrap(),
+            specular: case["specular_basis"].as_f64().unwrap(),
+        })
+        .collect()
+}
+
+fn assert_close(got: f64, want: f64, tolerance: f64, what: &str) {
+    assert!((got - want).abs() <= tolerance * want.abs().max(1e-6), "{what}: {got}, want {want}");
+}
+
+fn check_values<M: Model>(name: &str) {
+    let cases = cases(name);
+    assert!(cases.len() >= 10, "{name} has {} golden cases", cases.len());
+    for case in cases {
+        let shape = &case.shape[..M::SHAPE.len()];
+        let at = Illumination::new(case.light, case.view);
+        let exact = M::basis(case.normal, shape, &at, &case.optics);
+        assert_close(exact.diffuse, case.diffuse, 1e-5, name);
+        assert_close(exact.specular[0], case.specular, 1e-5, name);
+
+        let lanes = |vector: [f64; 3]| vector.map(Lane::<false>::splat);
+        let at = Illumination::new(lanes(case.light), lanes(case.view));
+        let shape: Vec<_> = shape.iter().map(|&value| Lane::splat(value)).collect();
+        let single = M::basis(lanes(case.normal), &shape, &at, &case.optics);
+        // Directions rounded to f32 move a lobe of width c by 1e-7 / c of it; an exponent of Phong multiplies them likewise.
+        assert_close(f64::from(single.diffuse.0[LANES - 1]), case.diffuse, 1e-5, name);
+        assert_close(f64::from(single.specular[0].0[LANES - 1]), case.specular, 2e-4, name);
+    }
+}
+
+/// Derivatives by each component of the normal and by the logarithm of each shape parameter, where neither a kink of G nor
+/// the edge of what is lit lies within the difference.
+fn check_derivatives<M: Model>(name: &str) {
+    let optics = Optics { index: 1.5, fresnel: FresnelAngle::Element };
+    let at = Illumination::new(normalise([0.4, 0.1, 0.9]), normalise([-0.2, 0.15, 1.0]));
+    let normal = normalise([0.12, 0.03, 1.0]);
+    let shape: Vec<f64> = M::SHAPE.iter().map(|parameter| parameter.prior.0).collect();
+    let evaluate = |normal: [f64; 3], shape: &[f64]| {
+        let basis = M::basis(normal, shape, &at, &optics);
+        [basis.diffuse, basis.specular[0]]
+    };
+    let step = 1e-6;
+    for p in 0..3 + shape.len() {
+        let dual_normal = std::array::from_fn(|i| Dual::<f64, 1>::parameter(normal[i], 0, f64::from(i == p)));
+        let dual_shape: Vec<_> =
+            shape.iter().enumerate().map(|(i, &s)| Dual::parameter(s, 0, if i + 3 == p { s } else { 0.0 })).collect();
+        let basis = M::basis(dual_normal, &dual_shape, &at, &optics);
+        let moved = |sign: f64| {
+            let normal = std::array::from_fn(|i| normal[i] + if i == p { sign * step } else { 0.0 });
+            let shape: Vec<f64> =
+                shape.iter().enumerate().map(|(i, &s)| if i + 3 == p { s * (sign * step).exp() } else { s }).collect();
+            evaluate(normal, &shape)
+        };
+        let (ahead, behind) = (moved(1.0), moved(-1.0));
+        for (dual, i) in [(basis.diffuse, 0), (basis.specular[0], 1)] {
+            let difference = (ahead[i] - behind[i]) / (2.0 * step);
+            assert!(
+                (dual.derivative[0] - difference).abs() < 1e-6 * (1.0 + difference.abs()),
+                "{name}, parameter {p}: {}, by differences {difference}",
+                dual.derivative[0]
+            );
+        }
+    }
+}
+
+macro_rules! check {
+    ($(($name:literal, $model:ty, $ambient:literal)),* $(,)?) => {
+        #[test]
+        fn all_models_meet_the_golden_values() {
+            $(check_values::<$model>($name);)*
+        }
+
+        #[test]
+        fn all_models_have_the_derivatives_of_their_values() {
+            $(check_derivatives::<$model>($name);)*
+        }
+    };
+}
+crate::for_each_model!(check);
