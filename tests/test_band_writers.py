@@ -6,10 +6,11 @@ import pytest
 import tifffile
 
 from impasto import icc
-from impasto.band_writers import BandWriter, prepare_folder, write_tiff_bands
+from impasto.band_writers import BandWriter, write_tiff_bands
 from impasto.colour import decode_srgb
 from impasto.errors import OutputError
 from impasto.images import profile
+from impasto.output import prepare_folder
 
 
 def read(path):

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto.band_writers import output_error
 from impasto.colour import encode_srgb, quantise
+from impasto.output import written_whole
 
 _LONGEST_PX = 1024
 _FRAME_MS = 90
@@ -71,8 +71,7 @@ class Animation:
         from PIL import Image
 
         frames: list[Any] = [Image.fromarray(frame) for _, frame in sorted(self._frames.items())]
-        temporary = self.path.with_name(f".{self.path.name}.partial")
-        try:
+        with written_whole(self.path) as temporary:
             frames[0].save(
                 temporary,
                 format="WEBP",
@@ -82,8 +81,3 @@ class Animation:
                 loop=0,
                 quality=_QUALITY,
             )
-            temporary.replace(self.path)
-        except OSError as error:
-            raise output_error(self.path, error.strerror or str(error)) from error
-        finally:
-            temporary.unlink(missing_ok=True)

@@ -6,7 +6,6 @@ pictures that are in memory anyway.
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from os import PathLike
 from pathlib import Path
@@ -17,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.colour import quantise
-from impasto.errors import OutputError, Problem
+from impasto.errors import OutputError
 from impasto.images import profile
+from impasto.output import output_error, partial_path, written_whole
 
 _TIFF_STRIP_ROWS = 64
-_FULL_DISK_BYTES = 1 << 16
 
 
 class BandWriter:
@@ -72,7 +71,7 @@ class BandWriter:
         else:
             spec.attribute("compression", "zip")
             spec.attribute("DateTime", "")
-        self._temporary = _temporary(self.path)
+        self._temporary = partial_path(self.path)
         output: Any = oiio.ImageOutput.create(self.path.suffix[1:].lower())
         self._output = output
         if not self._output.open(str(self._temporary), spec):
@@ -154,8 +153,7 @@ def write_tiff_bands(
 
     path = Path(path)
     height, width, channels = shape
-    temporary = _temporary(path)
-    try:
+    with written_whole(path) as temporary:
         tifffile.imwrite(
             temporary,
             data=_strips(bands),
@@ -171,11 +169,6 @@ def write_tiff_bands(
             iccprofile=profile("srgb", grey=channels == 1) if srgb else None,
             bigtiff=height * width * channels * np.dtype(dtype).itemsize > 3 << 30,
         )
-        temporary.replace(path)
-    except OSError as error:
-        raise output_error(path, error.strerror or str(error)) from error
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _strips(bands: Iterable[NDArray[Any]]) -> Iterator[bytes]:
@@ -194,41 +187,3 @@ def _strips(bands: Iterable[NDArray[Any]]) -> Iterator[bytes]:
         rest = joined[whole:]
     if rest is not None and len(rest):
         yield compressed(rest)
-
-
-def prepare_folder(out: str | PathLike[str]) -> Path:
-    """Make the folder `out` if it is not there, and return it.
-
-    Raises
-    ------
-    OutputError
-        If it is a file or cannot be made.
-    """
-    folder = Path(out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError as error:
-        raise OutputError(
-            Problem(str(folder), "is a file, and a folder is needed", "Choose another folder")
-        ) from error
-    except OSError as error:
-        raise output_error(folder, error.strerror or str(error)) from error
-    return folder
-
-
-def _temporary(path: Path) -> Path:
-    return path.with_name(f".{path.name}.partial")
-
-
-def output_error(path: Path, reason: str) -> OutputError:
-    """Return the error for a file that cannot be written; a full disk is named, which libraries seldom do."""
-    folder = next((parent for parent in path.absolute().parents if parent.exists()), Path("/"))
-    if shutil.disk_usage(folder).free < _FULL_DISK_BYTES:
-        reason = "there is no room left on the disk"
-    return OutputError(
-        Problem(
-            where=str(path),
-            what=f"cannot be written: {reason.rstrip('.')}",
-            do="Make room or choose another folder, then run the same command again",
-        )
-    )

@@ -1,4 +1,4 @@
-"""Write pictures: PNG, TIFF and EXR files, with an ICC profile where the format has room for one.
+"""Write pictures: PNG, TIFF, EXR and JPEG files, with an ICC profile where the format has room for one.
 
 Each file is written under a temporary name and renamed when it is whole. Colours are given sRGB's primaries
 until a camera's own are calibrated.
@@ -7,8 +7,7 @@ until a camera's own are calibrated.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -17,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.colour import decode_srgb
-from impasto.errors import OutputError, Problem
+from impasto.output import written_whole
 
 ProfileName = Literal["srgb", "linear"]
+Compression = Literal["deflate", "lzw", "zstd", "none"]
 
 # An ICC profile says when it was made; a fixed date keeps equal pictures equal byte for byte.
 _PROFILE_DATE = np.array([2000, 1, 1, 0, 0, 0], dtype=">u2").tobytes()
@@ -27,6 +27,8 @@ _PROFILE_DATE = np.array([2000, 1, 1, 0, 0, 0], dtype=">u2").tobytes()
 _WHITE = (0.3127, 0.3290)
 _PRIMARIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06)
 _D50 = (0.3457, 0.3585)
+_TIFF_STRIP_ROWS = 64
+_JPEG_QUALITY = 95
 _CHANNEL_NAMES = {1: ("Y",), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
 
 
@@ -115,9 +117,12 @@ def write_exr(
 
 
 def write_tiff(
-    path: str | os.PathLike[str], image: NDArray[Any], profile_name: ProfileName | None = None
+    path: str | os.PathLike[str],
+    image: NDArray[Any],
+    profile_name: ProfileName | None = None,
+    compression: Compression = "deflate",
 ) -> None:
-    """Write a TIFF file of 8 or 16 bits or of 32-bit floats, deflated with a predictor.
+    """Write a TIFF file of 8 or 16 bits or of 32-bit floats.
 
     Parameters
     ----------
@@ -125,6 +130,8 @@ def write_tiff(
     image : ndarray of shape (H, W) or (H, W, 1 or 3), uint8, uint16 or float32
     profile_name : {'srgb', 'linear'}, optional
         Profile to embed; None for data that are not colours.
+    compression : {'deflate', 'lzw', 'zstd', 'none'}, optional
+        How the samples are packed, without loss; the first two with a predictor, zstd for speed without.
 
     Raises
     ------
@@ -135,17 +142,38 @@ def write_tiff(
 
     image = _checked(image, (np.uint8, np.uint16, np.float32))
     grey = image.shape[2] == 1
-    with _written_whole(Path(path)) as temporary:
+    with written_whole(Path(path)) as temporary:
         tifffile.imwrite(
             temporary,
             image[..., 0] if grey else image,
             photometric="minisblack" if grey else "rgb",
-            compression="zlib",
-            predictor=True,
+            compression=None if compression == "none" else compression,
+            predictor=compression in ("deflate", "lzw"),
+            rowsperstrip=_TIFF_STRIP_ROWS,
             iccprofile=None if profile_name is None else profile(profile_name, grey),
             metadata=None,
             software="impasto",
         )
+
+
+def write_jpeg(path: str | os.PathLike[str], image: NDArray[np.uint8]) -> None:
+    """Write a JPEG file of high quality, with its colours at full resolution.
+
+    Parameters
+    ----------
+    path : path
+    image : ndarray of shape (H, W) or (H, W, 1 or 3), uint8
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    import imagecodecs
+
+    image = _checked(image, (np.uint8,))
+    with written_whole(Path(path)) as temporary:
+        temporary.write_bytes(imagecodecs.jpeg8_encode(image, level=_JPEG_QUALITY, subsampling="444"))
 
 
 def _checked(image: NDArray[Any], dtypes: Sequence[type]) -> NDArray[Any]:
@@ -182,29 +210,10 @@ def _write_with_oiio(
     if profile_name is not None:
         data = profile(profile_name, channels == 1)
         spec.attribute("ICCProfile", f"uint8[{len(data)}]", np.frombuffer(data, np.uint8))
-    with _written_whole(Path(path)) as temporary:
+    with written_whole(Path(path)) as temporary:
         output = oiio.ImageOutput.create(format_name)
         assert output is not None  # both formats are built into OpenImageIO
         # A full disk may show only when the last rows are flushed, so closing is checked too.
         whole = output.open(str(temporary), spec) and output.write_image(image)
         if not (output.close() and whole):
             raise OSError(output.geterror() or "no reason given")
-
-
-@contextmanager
-def _written_whole(path: Path) -> Iterator[Path]:
-    """Give a temporary name beside `path`; rename it when the block ends well, remove it when it does not."""
-    temporary = path.with_name(f".{path.name}.partial")
-    try:
-        yield temporary
-        os.replace(temporary, path)
-    except OSError as error:
-        raise OutputError(
-            Problem(
-                str(path),
-                f"cannot be written: {error.strerror or error}",
-                "Check that the folder exists, may be written to, and has room",
-            )
-        ) from error
-    finally:
-        temporary.unlink(missing_ok=True)

@@ -1,4 +1,7 @@
-"""Readable pictures of maps: colour maps that colour-blind readers can follow, each with its legend."""
+"""Readable pictures of maps: colour maps that colour-blind readers can follow, each with its legend.
+
+All functions raise `OutputError` if the picture cannot be written.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.colour import encode_srgb
+from impasto.output import written_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -269,6 +273,5 @@ def _legend(axes: Axes, entries: Sequence[tuple[str, str]], top: bool = False) -
 
 
 def _save(figure: Figure, path: Path) -> None:
-    temporary = path.with_name(path.name + ".partial")
-    figure.savefig(temporary, format="png", dpi=_DPI)
-    temporary.replace(path)
+    with written_whole(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=_DPI)

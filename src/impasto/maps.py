@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto import map_pictures
-from impasto.band_writers import BandWriter, output_error, prepare_folder, write_tiff_bands
+from impasto.band_writers import BandWriter, write_tiff_bands
 from impasto.colour import encode_srgb
 from impasto.models import parse_model
+from impasto.output import prepare_folder, write_json
 from impasto.progress import progress
 from impasto.store import STATUS_MEANING, Fit, level_sizes, open_fit
 
@@ -264,27 +264,22 @@ class _MapWriter:
 
     def _draw(self, low: float, high: float) -> None:
         path, heading = self._path(".png"), self._heading
-        try:
-            if self._name == "normal":
-                map_pictures.draw_normal(path, self._preview, title=heading)
-            elif self._name in _COLOURS and not self._uncertainty:
-                map_pictures.draw_colour(path, self._preview, title=heading, exposure=1 / high)
-            else:
-                values = self._preview
-                if values.ndim == 3:
-                    values = (
-                        np.sqrt(np.mean(np.square(values), axis=2)) if self._uncertainty else values[..., 0]
-                    )
-                map_pictures.draw_values(
-                    path,
-                    np.degrees(values) if self._name == "normal_sd" else values,
-                    title=heading,
-                    label=self._label(),
-                    logarithmic=self._name in _LOGARITHMIC or self._uncertainty,
-                    uncertainty=self._uncertainty,
-                )
-        except OSError as error:
-            raise output_error(path, error.strerror or str(error)) from error
+        if self._name == "normal":
+            map_pictures.draw_normal(path, self._preview, title=heading)
+        elif self._name in _COLOURS and not self._uncertainty:
+            map_pictures.draw_colour(path, self._preview, title=heading, exposure=1 / high)
+        else:
+            values = self._preview
+            if values.ndim == 3:
+                values = np.sqrt(np.mean(np.square(values), axis=2)) if self._uncertainty else values[..., 0]
+            map_pictures.draw_values(
+                path,
+                np.degrees(values) if self._name == "normal_sd" else values,
+                title=heading,
+                label=self._label(),
+                logarithmic=self._name in _LOGARITHMIC or self._uncertainty,
+                uncertainty=self._uncertainty,
+            )
 
     def _label(self) -> str:
         if self._name == "normal_sd":
@@ -329,11 +324,5 @@ def _write_manifest(summary: MapsSummary) -> None:
         }
         for entry in summary.maps
     }
-    path = summary.out / "maps.json"
-    temporary = path.with_name(f".{path.name}.partial")
-    text = json.dumps({"model": summary.model, "status": summary.status, "maps": entries}, indent=2)
-    try:
-        temporary.write_text(text + "\n", encoding="utf-8")
-        temporary.replace(path)
-    except OSError as error:
-        raise output_error(path, error.strerror or str(error)) from error
+    content = {"model": summary.model, "status": summary.status, "maps": entries}
+    write_json(summary.out / "maps.json", content)

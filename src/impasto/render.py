@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from impasto import _core
 from impasto.animation import Animation
-from impasto.band_writers import BandWriter, prepare_folder
+from impasto.band_writers import BandWriter
 from impasto.colour import encode_srgb
 from impasto.errors import OptionError, Problem
 from impasto.geometry import Camera, Lights, pixel_position_mm, turn_about_z
 from impasto.models import parse_model
+from impasto.output import prepare_folder
 from impasto.progress import progress
 from impasto.render_lights import requested_lights
 from impasto.store import Fit, open_fit, open_stack

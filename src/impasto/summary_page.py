@@ -13,6 +13,8 @@ from html import escape
 from importlib.resources import files
 from pathlib import Path
 
+from impasto.output import write_text
+
 
 @dataclass(frozen=True)
 class Picture:
@@ -131,7 +133,11 @@ class SummaryPage:
         )
 
     def write(self, path: Path) -> None:
-        """Write the page to `path`, whole or not at all."""
-        temporary = path.with_name(path.name + ".partial")
-        temporary.write_text(self.html(), encoding="utf-8")
-        temporary.replace(path)
+        """Write the page to `path`.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written.
+        """
+        write_text(path, self.html())

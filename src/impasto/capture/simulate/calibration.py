@@ -11,9 +11,11 @@ import numpy as np
 
 from impasto.capture.simulate import charts, spheres
 from impasto.capture.simulate.camera import Sensor
-from impasto.capture.simulate.files import write_image, write_text
+from impasto.capture.simulate.files import write_image
 from impasto.capture.simulate.illumination import light_at
 from impasto.geometry import Array, Camera, Lights, pixel_position_mm
+from impasto.images import Compression
+from impasto.output import prepare_folder, write_text
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class Studio:
     sensor : Sensor
     ending : str
         Of the image files.
-    compression : str
+    compression : {'zstd', 'deflate', 'lzw', 'none'}
     seed : int
     """
 
@@ -35,7 +37,7 @@ class Studio:
     camera: Camera
     sensor: Sensor
     ending: str
-    compression: str
+    compression: Compression
     seed: int
 
     @property
@@ -52,6 +54,7 @@ def write_calibration(folder: Path, studio: Studio) -> None:
     folder : Path
     studio : Studio
     """
+    prepare_folder(folder / "spheres")
     tables: dict[str, Callable[[], str]] = {
         "grey_scale.csv": lambda: charts.grey_scale().table(),
         "colour_chart.csv": lambda: charts.colour_chart().table(),

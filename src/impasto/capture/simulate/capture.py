@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from impasto.capture.simulate import lamps
 from impasto.capture.simulate.calibration import Studio, write_calibration
 from impasto.capture.simulate.camera import Sensor
-from impasto.capture.simulate.files import ENDINGS, make_folder, sweep, write_image, write_json, write_text
+from impasto.capture.simulate.files import ENDINGS, write_image
 from impasto.capture.simulate.illumination import Scene
 from impasto.capture.simulate.manifest import manifest
 from impasto.capture.simulate.measured import read_measured
@@ -26,6 +26,8 @@ from impasto.capture.simulate.settings import Settings
 from impasto.capture.simulate.truth import write_truth
 from impasto.errors import OptionError, Problem, raise_problems
 from impasto.geometry import Camera, Lights, tilt_direction
+from impasto.images import Compression
+from impasto.output import prepare_folder, remove_partial, write_json, write_text
 from impasto.progress import progress
 
 MANIFEST = "capture.toml"
@@ -102,7 +104,7 @@ def simulate(
     vignetting: float = 0.0,
     format: str = "tiff",
     bits: int | None = None,
-    compression: str = "zstd",
+    compression: Compression = "zstd",
     calibration: bool = True,
     show_progress: bool | None = None,
 ) -> Simulation:
@@ -318,8 +320,8 @@ def _folder_problems(folder: Path, settings: Settings) -> list[Problem]:
 
 def _start(folder: Path, settings: Settings) -> None:
     """Make the folder and note what it is for, so that an interrupted run can be taken up."""
-    make_folder(folder)
-    sweep(folder)
+    prepare_folder((folder / _STARTED).parent)
+    remove_partial(folder)
     write_json(folder / _STARTED, {"fingerprint": _fingerprint(settings), **_description(settings)})
 
 

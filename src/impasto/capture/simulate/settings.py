@@ -16,6 +16,7 @@ from impasto.capture.simulate.materials import SHAPES
 from impasto.capture.simulate.presets import PRESETS, SAMPLES
 from impasto.errors import Problem
 from impasto.geometry import Lights
+from impasto.images import Compression
 
 SIZE_LIMITS = (16, 32768)
 _COMPRESSIONS = ("zstd", "deflate", "lzw", "none")
@@ -51,7 +52,7 @@ class Settings:
     vignetting: float = 0.0
     format: str = "tiff"
     bits: int | None = None
-    compression: str = "zstd"
+    compression: Compression = "zstd"
     calibration: bool = True
 
     @property

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto.capture.simulate.files import write_image, write_json, write_text
+from impasto.capture.simulate.files import write_image
 from impasto.capture.simulate.illumination import Scene
 from impasto.capture.simulate.lamps import named
 from impasto.capture.simulate.manifest import light_positions
@@ -18,6 +18,7 @@ from impasto.capture.simulate.surface import Surface
 from impasto.colour import encode_srgb, quantise
 from impasto.geometry import Lights, dome_direction
 from impasto.images import write_png
+from impasto.output import write_json, write_text
 
 
 def write_truth(
