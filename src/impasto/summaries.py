@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from impasto.capture.simulate import Simulation
 from impasto.evaluate import EvaluateSummary
@@ -126,12 +126,6 @@ def percent(share: float) -> str:
     if share == 0:
         return "0 %"
     return f"{100 * share:.2f} %" if share >= 0.0001 else "under 0.01 %"
-
-
-def status_rows(pixels: Mapping[str, int]) -> list[Row]:
-    """Return a row per status, with its share of the pixels."""
-    total = max(sum(pixels.values()), 1)
-    return [(meaning, f"{count:,}", percent(count / total)) for meaning, count in pixels.items()]
 
 
 def _count(number: int, what: str) -> str:
