@@ -54,7 +54,7 @@ def halve_normal(normal: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def halve_status(status: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return the worst status of each 2 x 2 block, in the order of `store.STATUS_SEVERITY`."""
+    """Return the worst status of each 2 x 2 block of (H, W), in the order of `store.STATUS_SEVERITY`."""
     severity = np.array(stores.STATUS_SEVERITY, np.uint8)
     # A code that this version does not know counts as the worst.
     rank = np.full(256, len(severity) - 1, np.uint8)

@@ -127,6 +127,11 @@ class ErrorAccumulator:
         Returns
         -------
         ImageErrors
+
+        Raises
+        ------
+        ValueError
+            If rows are missing.
         """
         height, width, channels = self._shape
         if self._row != height:

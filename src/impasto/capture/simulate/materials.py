@@ -57,7 +57,7 @@ def fresnel(cos_incidence: Array, index: float) -> Array:
 
 
 def trowbridge_reitz(n_h: Array, c: Array) -> Array:
-    """Return the facet distribution of ellipsoids of eccentricity c, 1 at n·h = 1.
+    """Return the facet distribution of ellipsoids of eccentricity c, 1 at n·h = 1; shapes broadcast.
 
     References
     ----------
@@ -87,7 +87,7 @@ def v_groove(n_l: Array, n_v: Array, n_h: Array, v_h: Array) -> Array:
 
 
 def smith(n_l: Array, n_v: Array, c: Array) -> Array:
-    """Return the height-correlated Smith shadowing and masking of Trowbridge-Reitz facets.
+    """Return the height-correlated Smith shadowing and masking of Trowbridge-Reitz facets; shapes broadcast.
 
     References
     ----------

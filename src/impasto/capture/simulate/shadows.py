@@ -118,7 +118,9 @@ def march_distances(reach_px: float) -> list[float]:
 
 
 def disc_fraction(clearance: NDArray[np.floating], radius: float) -> Map:
-    """Return the share of a disc above a straight horizon, from its centre's clearance, in radians."""
+    """Return the share of a disc above a straight horizon; its centre's clearance, of any shape, and its
+    radius are in radians.
+    """
     t = np.clip(clearance / radius, -1, 1)
     return np.asarray(0.5 + (t * np.sqrt(1 - t**2) + np.arcsin(t)) / np.pi, dtype=np.float32)
 
