@@ -11,9 +11,14 @@ from impasto.errors import OutputError
 def test_an_interruption_leaves_the_old_file_and_nothing_else(tmp_path):
     path = tmp_path / "a.txt"
     output.write_text(path, "old")
-    with pytest.raises(KeyboardInterrupt), output.written_whole(path) as temporary:
-        temporary.write_text("half")
-        raise KeyboardInterrupt
+
+    def interrupted():
+        with output.written_whole(path) as temporary:
+            temporary.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
 

@@ -53,7 +53,7 @@ class Linearisation:
         self.clip_level = np.broadcast_to(level, (photograph.channels,)).astype(np.float64)
 
     def clipped_samples(self, band: NDArray[Any]) -> int:
-        """Return how many samples of a band of shape (rows, W, C), as the photograph holds them, are clipped."""
+        """Return how many samples of a band (rows, W, C), as the photograph holds them, are clipped."""
         if not math.isfinite(self._threshold):
             return int(np.count_nonzero(np.isposinf(band))) if self.is_float else 0
         threshold = self._threshold if self.is_float else math.ceil(self._threshold)
