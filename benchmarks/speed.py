@@ -34,8 +34,8 @@ def fit_core(problem: Problem) -> dict[str, Any]:
         problem.radiance,
         lights=lights,
         camera=Camera(np.array(VIEW_DIRECTION)),
-        light_rgb=np.ones(3),
-        clip_level=np.full(3, np.inf),
+        light_rgb=np.ones(problem.radiance.shape[-1]),
+        clip_level=np.full(problem.radiance.shape[-1], np.inf),
         noise=NOISE,
         options=FitOptions(index=INDEX),
     )

@@ -4,9 +4,12 @@ That a model is recovered from its own rendering proves little about the model, 
 does, but it proves the plumbing, and the standard deviations that come with it check every derivative.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from benchmarks import accuracy, problem
+from benchmarks.speed import fit_core
 
 import reference_models as reference
 from impasto import _core
@@ -179,3 +182,14 @@ def test_standard_deviations_describe_the_errors(fixed_problem):
         # components share one standard deviation, it lies between that and 0.83.
         median = np.median(np.abs(error[clear] / deviation[clear]))
         assert 0.64 < median < (0.85 if name == "normal" else 0.71), name
+
+
+def test_a_grey_stack_is_fitted_like_one_channel_of_a_colour_stack():
+    colour_problem = problem.simulate(256)
+    grey = np.ascontiguousarray(colour_problem.radiance[..., :1])
+    fitted = fit_core(replace(colour_problem, radiance=grey))
+    colour = fit_core(colour_problem)
+    assert fitted["diffuse"].shape == (256, 1)
+    error = np.abs(fitted["diffuse"][:, 0] / colour_problem.diffuse[:, 0] - 1)
+    assert np.median(error) < 3 * np.median(np.abs(colour["diffuse"] / colour_problem.diffuse - 1))
+    assert np.median(np.abs(fitted["chi2_reduced"] - 1)) < 0.3

@@ -1,5 +1,7 @@
 """The paper's procedure on arms: what it recovers, what it says, and what it refuses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from benchmarks.paper_figures import measure, measured_scene
@@ -186,7 +188,8 @@ def test_options_of_the_other_procedure_are_refused_and_do_not_identify_a_fit(bu
     _, joint = fitted(bumpy, LITERAL, procedure="joint")
     assert set(joint["options"]) == {"loss", "loss_scale", "max_steps", "shadow_level", "exclude"}
     _, paper = fitted(bumpy, LITERAL)
-    assert set(paper["options"]) == {"max_steps", "shadow_level", "exclude", "refined", "threshold_deg"}
+    own = {"refined", "threshold_deg", "highlight"}
+    assert set(paper["options"]) == {"max_steps", "shadow_level", "exclude", *own}
     assert FitOptions.of(paper) == LITERAL
 
 
@@ -243,6 +246,18 @@ def test_the_threshold_leaves_enough_lights():
     threshold_deg, seen_deg = choose_threshold(MODELS[MODEL], maps, lights, camera, LITERAL, 4)
     assert seen_deg > 50
     assert 36 < threshold_deg <= 48
+
+
+def test_the_threshold_may_count_from_the_peak_of_the_whole_sample(bumpy):
+    own, found_own = fitted(bumpy, LITERAL)
+    shared_peak, found = fitted(bumpy, replace(LITERAL, highlight="sample"))
+    # As differs in its last digits only: its pixel's own peak is the sample's.
+    assert found["sample"]["specular"] == pytest.approx(found_own["sample"]["specular"], rel=1e-6)
+    assert found["settings_sha256"] != found_own["settings_sha256"]
+    assert any("the brightest pixel's" in note for note in found["notes"])
+    # Pixels whose highlight lies elsewhere keep a part of it among their diffuse lights: it pulls their normals.
+    error = {name: theta_error_deg(maps, bumpy) for name, maps in (("own", own), ("shared", shared_peak))}
+    assert np.median(error["shared"]) > np.median(error["own"])
 
 
 def test_clipped_pixels_are_not_asked_for_the_peak(tmp_path):

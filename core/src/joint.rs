@@ -49,7 +49,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> JointFit<'a,
         JointFit {
             stack,
             options,
-            colour: array!(|k| Lane::splat(colour[k])),
+            colour: array!(|k| Lane::splat(colour.get(k).copied().unwrap_or(0.0))),
             group: Group::new(stack),
             grey: Vec::with_capacity(stack.lights.len()),
             kept: Vec::with_capacity(stack.lights.len()),

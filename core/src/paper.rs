@@ -21,11 +21,13 @@ use std::marker::PhantomData;
 /// What holds for the whole sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
-    /// Lights at least this far from the pixel's brightest, in radians, are taken to carry no specular term.
+    /// Lights at least this far from the highlight's peak, in radians, are taken to carry no specular term.
     pub threshold: f64,
     /// As, from the pixel that holds the highlight's peak.
     pub specular: f64,
     pub refined: bool,
+    /// Unit vector towards the light of the whole sample's highlight; each pixel's own where there is none.
+    pub peak: Option<[f64; 3]>,
 }
 
 /// The diffuse stage of Phong's form, Y = Ae + Ad max(0, n·l), with one Ae for all channels: as a basis function of
@@ -113,7 +115,10 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
                 sum[i] = sum[i] + Lane::select(at_peak, at.light[i], Lane::splat(0.0));
             }
         }
-        let peak = normalise(sum);
+        let peak = match self.sample.peak {
+            Some(direction) => array!(|i| Lane::splat(direction[i])),
+            None => normalise(sum),
+        };
         let nearest = Lane::splat(self.sample.threshold.cos());
         self.far.usable_lights = Lane::splat(0.0);
         self.far.illuminations.clone_from(&self.group.illuminations);

@@ -105,7 +105,7 @@ fn fast_instructions() -> bool {
     dispatch::fast_instructions()
 }
 
-/// Fits a model to every pixel of a tile; see `impasto.fit`. `paper` is (threshold in radians, As of the sample, refined)
+/// Fits a model to every pixel of a tile; see `impasto.fit`. `paper` is (threshold in radians, As of the sample, refined, direction of the sample's peak or None for each pixel's own)
 /// for the paper's procedure; an As of NaN stops after its diffuse stage.
 #[pyfunction]
 #[pyo3(signature = (model, radiance, *, scale, offset, light_direction, light_position_mm, light_intensity,
@@ -134,7 +134,7 @@ fn fit<'py>(
     loss: &str,
     loss_scale: f32,
     max_steps: usize,
-    paper: Option<(f64, f64, bool)>,
+    paper: Option<(f64, f64, bool, Option<[f64; 3]>)>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (name, ambient) = parse_model(model)?;
     let optics = parse_optics(index, fresnel)?;
@@ -186,8 +186,8 @@ fn fit<'py>(
     let fitted = py
         .detach(|| match paper {
             None => dispatch::fit(name, &stack, &light_rgb, options),
-            Some((threshold, specular, refined)) => {
-                let sample = Sample { threshold, specular, refined };
+            Some((threshold, specular, refined, peak)) => {
+                let sample = Sample { threshold, specular, refined, peak };
                 dispatch::paper(name, &stack, &light_rgb, sample, options)
             }
         })

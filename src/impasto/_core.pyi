@@ -27,7 +27,7 @@ def fit(
     loss: str,
     loss_scale: float,
     max_steps: int,
-    paper: tuple[float, float, bool] | None = None,
+    paper: tuple[float, float, bool, tuple[float, float, float] | None] | None = None,
 ) -> dict[str, NDArray[Any]]: ...
 def render(
     model: str,

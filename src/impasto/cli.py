@@ -174,6 +174,14 @@ def fit(
             help="The paper's procedure: how far from its peak a highlight is seen.",
         ),
     ] = f"{FitOptions.threshold_deg:g}",
+    highlight: Annotated[
+        str,
+        typer.Option(
+            "--highlight",
+            metavar="WHOSE",
+            help="The paper's procedure: peak that --threshold counts from, pixel or sample.",
+        ),
+    ] = FitOptions.highlight,
     index: Annotated[
         float, typer.Option("--index", metavar="N", help="Index of refraction of the surface.")
     ] = FitOptions.index,
@@ -209,6 +217,7 @@ def fit(
             exclude=tuple(exclude or ()),
             refined=refined,
             threshold_deg=_threshold(threshold),
+            highlight=highlight,
         )
         more: dict[str, Any] = {"models": tuple(model)} if model else {}
         summary = impasto.fit(

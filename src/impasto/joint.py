@@ -15,7 +15,7 @@ from impasto.models import ModelSpec
 from impasto.procedure import Findings, FitOptions
 from impasto.tile import fit_tile
 
-_FOREIGN = {"refined": "paper", "threshold_deg": "paper"}
+_FOREIGN = {"refined": "paper", "threshold_deg": "paper", "highlight": "paper"}
 
 
 class Joint:

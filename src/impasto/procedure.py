@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol
@@ -35,8 +36,11 @@ class FitOptions:
     refined : bool
         Whether the paper's procedure keeps the calibrated view and frees the normal instead.
     threshold_deg : float or None
-        Angle from a pixel's brightest light, in degrees, from which on the paper's procedure takes lights to
-        carry no specular term; None to have it chosen.
+        Angle from the highlight's peak, in degrees, from which on the paper's procedure takes lights to carry
+        no specular term; None to have it chosen.
+    highlight : str
+        Whose peak that is: ``pixel``, each pixel's own brightest light, or ``sample``, that of the brightest
+        pixel.
     """
 
     index: float = 1.5
@@ -48,6 +52,7 @@ class FitOptions:
     exclude: tuple[str, ...] = ()
     refined: bool = False
     threshold_deg: float | None = 35.0
+    highlight: str = "pixel"
 
     def problems(self) -> list[Problem]:
         """Return everything that is wrong with the options, apart from names to exclude."""
@@ -55,6 +60,7 @@ class FitOptions:
         for option, value, choices in (
             ("--fresnel", self.fresnel, ("facet", "element")),
             ("--loss", self.loss, ("linear", "cauchy", "huber")),
+            ("--highlight", self.highlight, ("pixel", "sample")),
         ):
             if value not in choices:
                 problems.append(
@@ -64,6 +70,10 @@ class FitOptions:
             problems.append(Problem("--index", f"is {self.index}, expected 1 to 5", "Varnish has about 1.5"))
         if not 0.0 < self.loss_scale < float("inf"):
             problems.append(Problem("--loss-scale", f"is {self.loss_scale}, expected above 0", "Try 3"))
+        if self.shadow_level is not None and not math.isfinite(self.shadow_level):
+            problems.append(
+                Problem("--shadow-level", f"is {self.shadow_level}, expected a number", "Try 0.005")
+            )
         if self.max_steps < 1:
             problems.append(Problem("--max-steps", f"is {self.max_steps}, expected 1 or more", "Try 60"))
         if self.threshold_deg is not None and not 0.0 < self.threshold_deg < 90.0:

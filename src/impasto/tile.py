@@ -21,16 +21,19 @@ class Sample:
     Parameters
     ----------
     threshold : float
-        Lights at least this far from a pixel's brightest, in radians, are taken to carry no specular term.
+        Lights at least this far from the highlight's peak, in radians, are taken to carry no specular term.
     specular : float
         As; NaN stops after the diffuse stage.
     refined : bool
         Whether the calibrated view is kept, and Ad, the normal and the shape are fitted over all lights.
+    peak : tuple of float or None
+        Direction of the light at the whole sample's peak; None for each pixel's own.
     """
 
     threshold: float
     specular: float
     refined: bool
+    peak: tuple[float, float, float] | None = None
 
 
 def fit_tile(
@@ -102,7 +105,7 @@ def fit_tile(
         loss=options.loss,
         loss_scale=options.loss_scale,
         max_steps=options.max_steps,
-        paper=None if paper is None else (paper.threshold, paper.specular, paper.refined),
+        paper=None if paper is None else (paper.threshold, paper.specular, paper.refined, paper.peak),
     )
     for ending in ("", "_sd"):
         if f"specular{ending}" not in result:

@@ -62,6 +62,7 @@ class Paper:
         self._arm_camera = self._arm.camera(stack.camera)
         self._light_rgb = stack.light_rgb
         self._sample: Sample | None = None
+        self._peak: tuple[float, float, float] | None = None
         self.maps = _maps(model, channels, refined=options.refined)
         raise_problems(
             OptionError,
@@ -110,9 +111,14 @@ class Paper:
         )
         crossing = Crossing(view_phi, reach, apparent.shape)
         threshold = float(np.radians(threshold_deg))
+        if self._options.highlight == "sample":
+            x, y, z = self._arm_lights.direction[found.light].tolist()
+            self._peak = (x, y, z)
         specular = self._specular(found, pixel, threshold)
         identified = crossing.identified and specular > 0
-        self._sample = Sample(threshold, specular if identified else float("nan"), self._options.refined)
+        self._sample = Sample(
+            threshold, specular if identified else float("nan"), self._options.refined, self._peak
+        )
         light = self._arm_lights.names[found.light]
         return Findings(
             attributes={
@@ -131,7 +137,7 @@ class Paper:
             },
             notes=(
                 *notes.plane(self._arm, view_phi, self._options.refined),
-                notes.threshold(threshold_deg, seen_deg),
+                notes.threshold(threshold_deg, seen_deg, self._options.highlight),
                 notes.specular(specular, crossing, found, light),
                 *notes.clipped(found.clipped_pixels, self._stack.shape[1] * self._stack.shape[2]),
             ),
@@ -191,7 +197,7 @@ class Paper:
         """Return As, by the form of the procedure."""
         if self._options.refined:
             return fit_brightest(self._model, pixel, self._options.shadow_level).specular
-        diffuse = self._fit(self._model, found.peak, Sample(threshold, float("nan"), False))
+        diffuse = self._fit(self._model, found.peak, Sample(threshold, float("nan"), False, self._peak))
         if not np.isfinite(diffuse["diffuse"]).all():
             return 0.0
         ambient = float(diffuse["ambient"][0, 0]) if self._model.ambient else 0.0

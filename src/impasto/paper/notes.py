@@ -48,7 +48,7 @@ def plane(arm: Arm, view_phi: float, refined: bool) -> tuple[str, ...]:
     return tuple(said)
 
 
-def threshold(threshold_deg: float, seen_deg: float | None) -> str:
+def threshold(threshold_deg: float, seen_deg: float | None, highlight: str = "pixel") -> str:
     """Say which lights the diffuse term is from, and, where the threshold was chosen, why.
 
     Parameters
@@ -56,8 +56,11 @@ def threshold(threshold_deg: float, seen_deg: float | None) -> str:
     threshold_deg : float
     seen_deg : float or None
         How far highlights are seen, if the threshold was chosen by that.
+    highlight : str
+        ``pixel`` or ``sample``: whose brightest light the threshold is taken from.
     """
-    said = f"lights less than {threshold_deg:g}° from a pixel's brightest do not count for its diffuse term"
+    whose = "a pixel's brightest" if highlight == "pixel" else "the brightest pixel's"
+    said = f"lights less than {threshold_deg:g}° from {whose} do not count for the diffuse term"
     if seen_deg is None:
         return said
     return (
