@@ -255,7 +255,7 @@ def test_the_threshold_may_count_from_the_peak_of_the_whole_sample(bumpy):
     assert found["sample"]["specular"] == pytest.approx(found_own["sample"]["specular"], rel=1e-6)
     assert found["settings_sha256"] != found_own["settings_sha256"]
     assert any("the brightest pixel's" in note for note in found["notes"])
-    # Pixels whose highlight lies elsewhere keep a part of it among their diffuse lights: it pulls their normals.
+    # Pixels whose highlight lies elsewhere keep a part of it among their diffuse lights.
     error = {name: theta_error_deg(maps, bumpy) for name, maps in (("own", own), ("shared", shared_peak))}
     assert np.median(error["shared"]) > np.median(error["own"])
 
