@@ -256,7 +256,7 @@ def test_a_full_disk_is_an_error_that_can_be_continued(stacked, expected, tmp_pa
 def test_room_is_checked_before_anything_is_fitted(small, monkeypatch):
     monkeypatch.setattr("shutil.disk_usage", lambda path: type("Usage", (), {"free": 1000}))
     monkeypatch.setattr("impasto.joint.fit_tile", lambda *_, **__: pytest.fail("fitted"))
-    with pytest.raises(StoreError, match="GB free"):
+    with pytest.raises(StoreError, match="MB free"):
         fit(small)
 
 

@@ -227,11 +227,24 @@ def test_a_full_disk_is_an_error_that_can_be_continued(tmp_path):
     assert contents(tmp_path / "s.zarr") == contents(tmp_path / "whole.zarr")
 
 
+@pytest.mark.parametrize(("dtype", "value"), [(np.uint8, 255), (np.uint16, 65535), (np.float32, np.nan)])
+def test_overexposed_and_missing_photographs_have_all_of_their_chunks(tmp_path, dtype, value):
+    images = [np.full((30, 530, 3), value, dtype) for _ in range(2)]
+    images[0][10, 10] = images[1][5, 520] = 0.25 if dtype == np.float32 else 80
+    stack(write_capture(tmp_path / "photos", images), tmp_path / "s.zarr")
+    chunks = sorted((tmp_path / "s.zarr" / "stack" / "radiance" / "c").rglob("*/0/*/0"))
+    assert len(chunks) == 4
+    read = stores.read_stack(tmp_path / "s.zarr", slice(0, 30), slice(0, 530))
+    usual = read[1, 10, 10]
+    np.testing.assert_array_equal(usual, np.nan if dtype == np.float32 else 1)
+    assert (read[0, 10, 10] < 0.5).all()
+
+
 def test_room_is_checked_before_anything_is_decoded(tmp_path, monkeypatch):
     folder = write_capture(tmp_path / "photos", noise_images(2, 40, 30))
     monkeypatch.setattr("shutil.disk_usage", lambda path: type("Usage", (), {"free": 1000}))
     monkeypatch.setattr(Photograph, "bands", lambda *_: pytest.fail("decoded"))
-    with pytest.raises(StoreError, match="GB free"):
+    with pytest.raises(StoreError, match="MB free"):
         stack(folder, tmp_path / "s.zarr")
 
 

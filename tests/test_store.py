@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 import warnings
@@ -201,10 +202,56 @@ def test_a_flipped_byte_of_a_map_is_found(painting, position):
             stores.read_fit(path, "phong", rows, slice(0, 250))
 
 
-def test_a_lost_chunk_is_overexposed_and_never_dark(painting):
+def test_a_lost_chunk_is_told_and_overexposed_to_other_programs(painting):
     path, *_ = painting
-    (path / "stack" / "radiance" / "c" / "0" / "0" / "0" / "0").unlink()
-    assert (stores.open_stack(path).read(slice(0, 512), slice(0, 512))[0] == 65535).all()
+    for light in (0, 2):
+        (path / "stack" / "radiance" / "c" / str(light) / "0" / "0" / "0").unlink()
+    stack = stores.open_stack(path)
+    with pytest.raises(StoreError) as caught:
+        stack.read(slice(0, 10), slice(0, 10))
+    assert [problem.what for problem in caught.value.problems] == [
+        "käse 0 has lost pixels",
+        "käse 2 has lost pixels",
+    ]
+    assert len(stack.read(slice(0, 10), slice(0, 10), lights=[1, 3])) == 2
+    assert len(stack.read(slice(512, 520), slice(0, 10))) == 4
+    assert (stores.open(path)["stack/radiance"][0, :512, :512] == 65535).all()
+
+
+@pytest.mark.parametrize("name", ["light_name", "light_direction", "light_intensity"])
+def test_lights_that_are_lost_are_told(painting, name):
+    path, *_ = painting
+    shutil.rmtree(path / "stack" / name / "c")
+    with pytest.raises(StoreError, match=f"stack/{name}: has lost its values"):
+        stores.lights(path)
+
+
+def test_an_empty_chunk_is_damage(painting):
+    path, *_ = painting
+    (path / "stack" / "radiance" / "c" / "1" / "0" / "0" / "0").write_bytes(b"")
+    with pytest.raises(StoreError, match="käse 1 is damaged"):
+        stores.read_stack(path, slice(0, 512), slice(0, 512))
+
+
+@pytest.mark.parametrize("lost", ["c/1/0/0", "zarr.json"])
+def test_a_map_of_which_a_part_is_lost_is_told(painting, lost):
+    path, *_ = painting
+    (path / "fits" / "phong" / "diffuse" / lost).unlink()
+    with pytest.raises(StoreError, match="fits/phong/diffuse"):
+        stores.read_fit(path, "phong", slice(1030, 1040), slice(0, 250))
+
+
+def test_a_stack_without_its_attributes_or_array_says_how_to_mend_it(painting):
+    path, *_ = painting
+    document = path / "stack" / "zarr.json"
+    metadata = json.loads(document.read_text())
+    del metadata["attributes"]["scale"], metadata["attributes"]["noise"]
+    document.write_text(json.dumps(metadata))
+    with pytest.raises(StoreError, match=r"lacks the attributes scale, noise.*--overwrite"):
+        stores.open_stack(path)
+    (path / "stack" / "radiance" / "zarr.json").unlink()
+    with pytest.raises(StoreError, match="lacks the attributes"):
+        stores.open_stack(path)
 
 
 def test_a_unit_is_whole_only_with_all_of_its_status(tmp_path, rng):

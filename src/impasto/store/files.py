@@ -22,6 +22,9 @@ _NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 # Names of files being written: by `write_json` with a process number, by zarr-python with a UUID.
 _PARTIAL = re.compile(r".+\.(\d+|[0-9a-f]{32})\.partial")
 
+# What decoders raise on a chunk with a wrong checksum, cut off, or empty.
+DAMAGE = (OSError, RuntimeError, ValueError, IndexError)
+
 # zarrs reports faults of the disk as text only.
 _OS_ERROR = re.compile(r"\(os error (\d+)\)")
 
@@ -75,10 +78,14 @@ def no_room(store: Path, needed: int) -> list[Problem]:
     return [
         Problem(
             where=str(store),
-            what=f"needs about {needed / 1e9:.2f} GB, and the disk has {free / 1e9:.2f} GB free",
+            what=f"needs about {_size(needed)}, and the disk has {_size(free)} free",
             do="Make room or choose another place for the store",
         )
     ]
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e9:.2f} GB" if count >= 1e8 else f"{count / 1e6:.2f} MB"
 
 
 def size_on_disk(path: Path) -> int:
@@ -114,11 +121,11 @@ def writing(store: Path, what: str) -> Iterator[None]:
 def reading(store: Path, what: str, do: str) -> Iterator[None]:
     """Turn damage found while `what` is read into a `StoreError` that advises `do`.
 
-    Every chunk carries a checksum; decoders raise RuntimeError, ValueError or a bare OSError on a wrong one.
+    Every chunk carries a checksum.
     """
     try:
         yield
-    except (OSError, RuntimeError, ValueError) as error:
+    except DAMAGE as error:
         if isinstance(error, OSError) and error.errno is not None:
             cause = f"cannot be read: {error.strerror}"
         else:

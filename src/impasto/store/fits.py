@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.errors import Problem, StoreError
-from impasto.store.files import reading, writing
+from impasto.store.files import DAMAGE, reading, writing
 from impasto.store.hierarchy import (
     Attributes,
     coarser_group,
     create_map,
     fit_group,
     has_array,
+    lost_pieces,
     open_array,
     open_sharded,
     read_group,
@@ -88,7 +89,7 @@ class MapsWriter:
             return False
         try:
             self._arrays["status"][unit.rows, unit.columns]
-        except (OSError, RuntimeError, ValueError):  # damaged: as good as not there
+        except DAMAGE:  # as good as not there
             return False
         return True
 
@@ -170,8 +171,7 @@ class Fit:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the maps."""
-        found = (path.parent.name for path in (self.store / self.group).glob("*/zarr.json"))
-        return tuple(sorted(found))
+        return tuple(sorted(path.name for path in (self.store / self.group).iterdir() if path.is_dir()))
 
     @cached_property
     def _arrays(self) -> dict[str, zarr.Array[Any]]:
@@ -201,12 +201,15 @@ class Fit:
         Raises
         ------
         StoreError
-            If a map is damaged.
+            If a map is damaged or lost.
         """
         tile = {}
         for name in self.names if names is None else names:
             do = "Run impasto fit with --overwrite to compute it anew"
-            with reading(self.store, f"{self.group}/{name}", do):
+            path = f"{self.group}/{name}"
+            if lost_pieces(self.store, path, self._arrays[name], rows, columns):
+                raise StoreError(Problem(f"{self.store}: {path}", "has lost a part of its pixels", do))
+            with reading(self.store, path, do):
                 tile[name] = np.asarray(self._arrays[name][rows, columns])
         return tile
 

@@ -7,11 +7,13 @@ Groups are small JSON documents, written here directly and atomically; arrays go
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -110,7 +112,7 @@ def source_problems(store: Path) -> list[Problem]:
     if not store.exists():
         return [Problem(str(store), "there is no such store", "Make it with: impasto stack PHOTOS STORE")]
     schema = None if attributes is None else attributes.get("impasto_schema")
-    if not isinstance(schema, int):
+    if not isinstance(schema, int) or isinstance(schema, bool) or schema < 1:
         return [
             Problem(
                 where=str(store),
@@ -254,6 +256,28 @@ def _open(store: Path, path: str, pipeline: str, mode: Literal["r", "r+"]) -> za
                 do="Restore it from a copy, or run the command that made it again with --overwrite",
             )
         ) from error
+
+
+def lost_pieces(store: Path, path: str, array: zarr.Array[Any], *slices: slice) -> list[tuple[int, ...]]:
+    """Return the files of an array, by their chunk's or shard's number, that a selection needs and lacks.
+
+    Zarr reads what is not there as the fill value; but impasto writes every chunk, so such a file was lost.
+
+    Parameters
+    ----------
+    store : Path
+    path : str
+        Path of the array.
+    array : zarr.Array
+    *slices : slice
+        The selection along the first axes; the others are taken whole.
+    """
+    taken = [*slices, *(slice(None) for _ in array.shape[len(slices) :])]
+    axes = zip(taken, array.shape, array.shards or array.chunks, strict=True)
+    bounds = ((*part.indices(length)[:2], size) for part, length, size in axes)
+    numbers = (range(start // size, -(-stop // size)) for start, stop, size in bounds)
+    folder = f"{store}/{path}/c/"
+    return [piece for piece in product(*numbers) if not os.path.exists(folder + "/".join(map(str, piece)))]
 
 
 def has_array(store: Path, path: str) -> bool:

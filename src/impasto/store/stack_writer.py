@@ -18,14 +18,16 @@ from impasto.store.files import digest, writing
 from impasto.store.hierarchy import (
     Attributes,
     create_stack_array,
+    lost_pieces,
     open_array,
+    open_sharded,
     provenance,
     read_group,
     remove,
     write_group,
     write_table,
 )
-from impasto.store.layout import FITS, PYRAMIDS, SCHEMA, STACK
+from impasto.store.layout import FITS, PYRAMIDS, SCHEMA, STACK, STACK_CHUNK
 
 _TABLES: dict[str, tuple[tuple[str, ...], Attributes]] = {
     "light_name": (("light",), {"long_name": "name of the photograph"}),
@@ -203,7 +205,22 @@ class StackWriter:
 
     def finish_light(self, light: int, sha256: str, clipped_samples: int) -> None:
         """Record that a photograph is written whole."""
+        self._write_empty_chunks(light)
         self._record(light, sha256, clipped_samples)
+
+    def _write_empty_chunks(self, light: int) -> None:
+        """Write what the Rust codecs leave out: chunks at the image's edge that hold the fill value only.
+
+        Without them a chunk that was lost could not be told from one that is overexposed or missing.
+        """
+        path = f"{STACK}/radiance"
+        absent = lost_pieces(self.store, path, self._radiance, slice(light, light + 1))
+        if absent:
+            array = open_sharded(self.store, path)  # with zarr-python's codecs, which write all
+            with writing(self.store, path):
+                for _, row, column, _ in absent:
+                    rows, columns = (slice(n * STACK_CHUNK, (n + 1) * STACK_CHUNK) for n in (row, column))
+                    array[light : light + 1, rows, columns] = array.fill_value
 
     def _record(self, light: int, sha256: str | None, clipped_samples: int | None) -> None:
         with self._writing:

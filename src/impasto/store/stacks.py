@@ -11,15 +11,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from impasto.errors import Problem, StoreError
+from impasto.errors import Problem, StoreError, raise_problems
 from impasto.geometry import Camera, Lights
-from impasto.store.files import digest, reading
-from impasto.store.hierarchy import Attributes, has_array, open_array, read_group, source_problems
+from impasto.store.files import DAMAGE, digest, reading
+from impasto.store.hierarchy import (
+    Attributes,
+    has_array,
+    lost_pieces,
+    open_array,
+    read_group,
+    source_problems,
+)
 from impasto.store.layout import ASSUMED_WHITE, STACK
 from impasto.store.stack_writer import unfinished_stack
 
 if TYPE_CHECKING:
     import zarr
+
+_REQUIRED = ("scale", "offset", "clip_level", "noise", "camera", "inputs", "settings_sha256")
 
 _AGAIN = "Run impasto stack with the same photographs and --overwrite to write it anew"
 
@@ -42,10 +51,14 @@ class Stack:
     def _radiance(self) -> zarr.Array[Any]:
         return open_array(self.store, f"{STACK}/radiance")
 
-    def _table(self, name: str) -> NDArray[Any]:
+    def _table(self, name: str, *, known: bool = True) -> NDArray[Any]:
+        # What is not known is NaN for every light, and Zarr need not write that.
         path = f"{STACK}/{name}"
+        array = open_array(self.store, path)
+        if known and lost_pieces(self.store, path, array):
+            raise StoreError(Problem(f"{self.store}: {path}", "has lost its values", _AGAIN))
         with reading(self.store, path, _AGAIN):
-            return np.asarray(open_array(self.store, path)[...])
+            return np.asarray(array[...])
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
@@ -64,9 +77,9 @@ class Stack:
         return Lights(
             names=tuple(str(name) for name in self._table("light_name")),
             direction=self._table("light_direction"),
-            position_mm=self._table("light_position_mm"),
+            position_mm=self._table("light_position_mm", known=False),
             intensity=self._table("light_intensity"),
-            angular_size_deg=self._table("light_angular_size_deg"),
+            angular_size_deg=self._table("light_angular_size_deg", known=False),
         )
 
     @property
@@ -149,15 +162,16 @@ class Stack:
         Raises
         ------
         StoreError
-            Listing every photograph whose stored pixels are damaged.
+            Listing every photograph whose stored pixels are damaged or lost.
         """
         count, _, _, channels = self.shape
         index = np.arange(count) if lights is None else np.asarray(lights, dtype=np.intp)
         shape = (len(index), rows.stop - rows.start, columns.stop - columns.start, channels)
+        raise_problems(StoreError, self._lost(rows, columns, index))
         tile = np.empty(shape, self.dtype) if buffer is None else buffer[: math.prod(shape)].reshape(shape)
         try:
             self._read_into(tile, index, rows, columns)
-        except (OSError, RuntimeError, ValueError) as error:
+        except DAMAGE as error:
             raise StoreError(self._damage(rows, columns, error)) from error
         return tile
 
@@ -171,6 +185,13 @@ class Stack:
                 selection = (slice(int(index[run[0]]), int(index[run[-1]]) + 1), rows, columns, slice(None))
                 self._radiance.get_basic_selection(selection, out=NDBuffer.from_numpy_array(part))
 
+    def _lost(self, rows: slice, columns: slice, index: NDArray[np.intp]) -> list[Problem]:
+        path, count = f"{STACK}/radiance", self.shape[0]
+        pieces = lost_pieces(self.store, path, self._radiance, slice(0, count), rows, columns)
+        lost = {piece[0] for piece in pieces} & set(index.tolist())
+        names = [self.attributes["inputs"][light]["name"] for light in sorted(lost)]
+        return [Problem(f"{self.store}: {path}", f"{name} has lost pixels", _AGAIN) for name in names]
+
     def _damage(self, rows: slice, columns: slice, error: Exception) -> list[Problem]:
         problems = []
         place = f"{self.store}: {STACK}/radiance"
@@ -178,7 +199,7 @@ class Stack:
         for light, entry in enumerate(self.attributes["inputs"]):
             try:
                 self._radiance[light : light + 1, rows, columns]
-            except (OSError, RuntimeError, ValueError) as cause:
+            except DAMAGE as cause:
                 problems.append(Problem(place, f"{entry['name']} is damaged at {where}: {cause}", _AGAIN))
         return problems or [Problem(place, f"cannot be read at {where}: {error}", _AGAIN)]
 
@@ -209,10 +230,15 @@ def open_stack(store: str | Path) -> Stack:
     if problems:
         raise StoreError(problems)
     attributes = read_group(store / STACK)
-    if attributes is None or not has_array(store, f"{STACK}/radiance"):
+    if attributes is None:
         raise StoreError(
             Problem(str(store), "has no stack of photographs", "Make it with: impasto stack PHOTOS STORE")
         )
     if not attributes.get("complete"):
         raise StoreError(unfinished_stack(store, attributes))
+    if missing := [name for name in _REQUIRED if name not in attributes]:
+        what = f"lacks the attributes {', '.join(missing)}"
+        raise StoreError(Problem(f"{store}: {STACK}/zarr.json", what, _AGAIN))
+    if not has_array(store, f"{STACK}/radiance"):
+        raise StoreError(Problem(f"{store}: {STACK}/radiance", "has lost its metadata", _AGAIN))
     return Stack(store, attributes)
