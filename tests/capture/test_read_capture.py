@@ -104,6 +104,15 @@ def test_everything_wrong_is_listed_at_once(make_capture):
         assert problem.startswith(start)
 
 
+def test_rows_that_cannot_be_read_hide_no_other_mismatch(make_capture):
+    text = "a.tif 0 1\nb.tif 0 0 1\nb.tif 0 0.1 1\nz.tif 0 0 1\n"
+    assert [problem.split(":")[0] for problem in problems(make_capture(text=text))] == [
+        "dirs.lp row 1",
+        "dirs.lp row 4",
+        "b.tif",
+    ]
+
+
 def test_missing_light_file_and_photographs_are_reported_together(tmp_path):
     (tmp_path / "image.nef").write_bytes(b"")
     (tmp_path / "dark").mkdir()

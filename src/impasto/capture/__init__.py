@@ -102,10 +102,9 @@ def read_capture(
     pairs: list[Pair] = []
     kept: Sequence[Path] = paths
     notes: list[str] = []
-    # A row that could not be read has no name: pairing would call its photograph one without a light.
     if light_file and paths:
         pairs, kept, notes, pair_problems = pair(light_file, paths, list(exclude))
-        problems += pair_problems if not light_file.problems else []
+        problems += pair_problems
     if not kept and paths:
         problems.append(Problem(str(folder), "all photographs are left out", "Exclude fewer names"))
     photographs, header_notes, header_problems = _read_headers(

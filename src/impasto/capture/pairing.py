@@ -41,8 +41,10 @@ def pair(
         All photographs that are not excluded, paired or not.
     notes : list of str
     problems : list of Problem
-        Every light without a photograph, photograph without a light, and name that is not unique.
+        Every light without a photograph, photograph without a light, and name that is not unique. Where rows
+        could not be read, nobody knows which photographs have no light, and none is reported.
     """
+    unread = bool(lights.problems)
     problems = [
         Problem(
             f"--exclude {pattern}",
@@ -61,6 +63,8 @@ def pair(
         # What is left out may have a direction, as a bad photograph, or none, as one of a test target.
         named = photographs if len(rows) == len(photographs) else kept
         if len(rows) != len(named):
+            if unread:
+                return [], kept, notes, problems
             # One problem, not one per photograph: without names nobody can say which one is too many.
             what = f"holds {len(rows)} directions without names, the folder {len(photographs)} photographs"
             do = "Remove what does not belong there, or give the lights by name in a .lp or CSV file"
@@ -71,12 +75,12 @@ def pair(
         )
         pairs = [(row, path) for row, path in zip(rows, named, strict=True) if path in kept]
         return pairs, kept, notes, problems
-    pairs, pair_notes, pair_problems = _pair_by_name(lights.path.name, rows, kept)
+    pairs, pair_notes, pair_problems = _pair_by_name(lights.path.name, rows, kept, unread)
     return pairs, kept, notes + pair_notes, problems + pair_problems
 
 
 def _pair_by_name(
-    light_file: str, rows: Sequence[LightRow], photographs: Sequence[Path]
+    light_file: str, rows: Sequence[LightRow], photographs: Sequence[Path], unread: bool
 ) -> tuple[list[Pair], list[str], list[Problem]]:
     by_name = _group(photographs, lambda path: _key(path.name))
     by_stem = _group(photographs, lambda path: _key(path.stem))
@@ -104,7 +108,7 @@ def _pair_by_name(
             what = f"is named by {len(named)} lights: {', '.join(row.where for row in named)}"
             problems.append(Problem(path.name, what, f"Keep one of them in {light_file}"))
     for path in photographs:
-        if path not in found:
+        if path not in found and not unread:
             do = f"Add it to {light_file}, or leave it out with --exclude"
             problems.append(Problem(path.name, f"no light in {light_file} has this name", do))
     notes = []

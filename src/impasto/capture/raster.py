@@ -221,5 +221,5 @@ def _number(spec: ImageSpec, name: str) -> float | None:
 
 
 def _one_line(message: str) -> str:
-    """Return the first line of a library's message, which may repeat itself over several."""
-    return message.strip().split("\n")[0].strip()
+    """Return the first line of a library's message, which may repeat itself, without its full stop."""
+    return message.strip().split("\n")[0].strip().rstrip(".")
