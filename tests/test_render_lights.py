@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from impasto.errors import ImpastoError, OptionError
+from impasto.errors import CaptureError, ImpastoError, OptionError
 from impasto.geometry import Camera, arm_direction, dome_direction
 from impasto.render_lights import parse_angles, parse_light, requested_lights
 
@@ -33,6 +33,11 @@ def test_what_is_no_angle_is_named(text):
         parse_angles([text])
 
 
+def test_a_sweep_without_end_is_refused_before_it_is_made():
+    with pytest.raises(OptionError, match="60,000,000,001 angles"):
+        parse_angles(["0:60:1e-9", "10"])
+
+
 @pytest.mark.parametrize("text", ["45", "45,90,1", "a,b", "inf,0"])
 def test_what_is_no_direction_is_named(text):
     with pytest.raises(OptionError, match="ZENITH,AZIMUTH"):
@@ -53,6 +58,15 @@ def test_every_light_below_the_painting_is_listed():
     with pytest.raises(OptionError) as caught:
         requested_lights(None, [(95, 0), (45, 0)], [120, 10], 3, CAMERA)
     assert [problem.where for problem in caught.value.problems] == ["--light 95,0", "--arm 120"]
+
+
+def test_rows_that_cannot_be_read_and_lights_that_cannot_be_used_are_listed_together(tmp_path):
+    path = tmp_path / "test.lp"
+    path.write_text("a.jpg 0 1\nb.jpg 0 0 -1\nc.jpg nan 0 1\n")
+    with pytest.raises(CaptureError) as caught:
+        requested_lights(path, [(95, 0)], [], 3, CAMERA)
+    where = [problem.where for problem in caught.value.problems]
+    assert where == ["test.lp row 1", "test.lp row 2", "test.lp row 3", "--light 95,0"]
 
 
 def test_two_lights_of_one_name_would_overwrite_each_other(tmp_path):

@@ -15,6 +15,9 @@ from impasto.capture.lights import LightRow, check_rows, make_lights, place
 from impasto.errors import CaptureError, OptionError, Problem, raise_problems
 from impasto.geometry import Camera, Lights
 
+# More than anybody looks at: 100 s of film at 100 pictures per second.
+_MOST_ANGLES = 10_000
+
 
 def parse_angles(texts: Iterable[str]) -> list[float]:
     """Return arm angles in degrees from texts such as ``30``, ``-60,0,60`` and ``-60:60:5``.
@@ -31,7 +34,7 @@ def parse_angles(texts: Iterable[str]) -> list[float]:
     Raises
     ------
     OptionError
-        Listing every text that is none of these.
+        Listing every text that is none of these, or asks for more than 10,000 angles.
     """
     angles: list[float] = []
     problems = []
@@ -39,7 +42,12 @@ def parse_angles(texts: Iterable[str]) -> list[float]:
         try:
             if ":" in text:
                 start, stop, step = (_finite(part) for part in text.split(":"))
-                angles += _sweep(start, stop, step)
+                count = _steps(start, stop, step)
+                if count > _MOST_ANGLES:
+                    what = f"asks for {count:,} angles, expected {_MOST_ANGLES:,} at most"
+                    problems.append(Problem(f"--arm {text}", what, "Give a larger step"))
+                    continue
+                angles += [round(start + index * step, 9) for index in range(count)]
             else:
                 angles += [_finite(part) for part in text.split(",")]
         except ValueError:
@@ -110,9 +118,10 @@ def requested_lights(
         If the light file cannot be read.
     """
     rows: list[LightRow] = []
+    unreadable: list[Problem] = []
     if lights is not None:
         file = read_light_file(Path(lights))
-        raise_problems(CaptureError, file.problems)
+        unreadable = file.problems
         rows += file.rows
     for zenith_deg, azimuth_deg in light:
         direction, _ = place(zenith_deg=zenith_deg, azimuth_deg=azimuth_deg)
@@ -120,7 +129,7 @@ def requested_lights(
     for angle in arm:
         direction, _ = place(arm_angle_deg=angle)
         rows.append(LightRow(where=f"--arm {angle:g}", file=None, direction=direction))
-    if not rows:
+    if not rows and not unreadable:
         raise OptionError(
             Problem(
                 where="render",
@@ -144,7 +153,7 @@ def requested_lights(
                 do="State mm_per_px under [camera] in the photographs' TOML file and stack them again",
             )
         )
-    raise_problems(OptionError, problems)
+    raise_problems(CaptureError if unreadable else OptionError, [*unreadable, *problems])
     return make_lights(rows, names, np.ones(len(rows)))
 
 
@@ -167,10 +176,9 @@ def _finite(text: str) -> float:
     return number
 
 
-def _sweep(start: float, stop: float, step: float) -> list[float]:
-    """Return the angles from `start` to `stop`, both included where the step meets the end."""
+def _steps(start: float, stop: float, step: float) -> int:
+    """Return how many angles lie from `start` to `stop`, both included where the step meets the end."""
     if step == 0 or (stop - start) / step < 0:
         raise ValueError("the step leads away from the end")
     # A thousandth of a step makes up for the rounding of decimal fractions.
-    count = math.floor((stop - start) / step + 1e-3) + 1
-    return [round(start + index * step, 9) for index in range(count)]
+    return math.floor((stop - start) / step + 1e-3) + 1
