@@ -1,6 +1,7 @@
 """The command line: names, exit codes, what is printed and what is written as data."""
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -188,6 +189,48 @@ def test_a_fault_of_the_program_says_how_to_report_it(painting, monkeypatch, tmp
     debugged = run("maps", painting, "--model", MODEL, "--out", tmp_path, "--debug")
     assert debugged.exit_code == 1
     assert "Traceback" in debugged.output
+
+
+def test_a_panic_of_the_core_is_a_fault_and_no_traceback(painting, monkeypatch, tmp_path):
+    panic = type("PanicException", (BaseException,), {})  # as pyo3 has it
+
+    def fail(*_, **__):
+        raise panic("index out of bounds")
+
+    monkeypatch.setattr("impasto.maps", fail)
+    data = tmp_path / "data.json"
+    result = run("maps", painting, "--model", MODEL, "--out", tmp_path, "--json", data)
+    assert result.exit_code == 1
+    assert "PanicException: index out of bounds" in flat(result.output)
+    assert json.loads(data.read_text())["exit_code"] == 1
+
+
+@pytest.mark.parametrize("name", ["", "no/data.json"])
+def test_data_that_cannot_be_written_are_told_before_the_work(monkeypatch, tmp_path, name):
+    monkeypatch.setattr("impasto.maps", lambda *_, **__: pytest.fail("the work began"))
+    result = run("maps", "p.zarr", "--model", MODEL, "--out", tmp_path, "--json", tmp_path / name)
+    assert result.exit_code == 1
+    assert "--json" in result.output
+    assert "→" in result.output
+
+
+def test_data_go_through_a_pipe_and_leave_it_one(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        assert run("models", "--json", pipe).exit_code == 0
+        assert json.loads(os.read(reader, 1 << 16))["command"] == "models"
+    finally:
+        os.close(reader)
+    assert pipe.is_fifo()
+
+
+def test_a_shadow_level_that_is_no_number_is_refused(painting):
+    result = run("fit", painting, "--shadow-level", "nan")
+    assert result.exit_code == 1
+    assert "--shadow-level" in result.output
+    assert "fault of the program" not in result.output
 
 
 def test_version_is_told():

@@ -11,7 +11,7 @@ import platform
 import sys
 import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,10 @@ _FAULTS_OF_THE_DISK = {
     errno.EROFS: "the disk is read-only",
     errno.EACCES: "this account may not write or read here",
     errno.EPERM: "this account may not write or read here",
+    errno.ENAMETOOLONG: "the name is longer than the disk allows",
+    errno.ENOTDIR: "a part of the path is a file, and a folder is needed",
+    errno.EISDIR: "is a folder, and a file is needed",
+    errno.EIO: "the disk fails",
 }
 
 
@@ -94,6 +98,10 @@ def reporting(command: str, json_file: Path | None = None, debug: bool = False) 
     report = Report(command)
     problems: list[Problem] = []
     code = 0
+    if json_file is not None and (problem := _unwritable(json_file)):
+        # Said before the work, which may take hours, and not after it.
+        show_problems(command, [problem])
+        raise typer.Exit(EXIT_PROBLEM)
     try:
         yield report
     except KeyboardInterrupt:
@@ -115,7 +123,10 @@ def reporting(command: str, json_file: Path | None = None, debug: bool = False) 
             code = EXIT_PROBLEM
             problems = [Problem(where, what, "Make room or choose another place, then run the command again")]
             show_problems(command, problems)
-    except Exception as error:
+    except BaseException as error:
+        # A panic of the core is no Exception, so that nobody takes it for an error that can be ignored.
+        if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
+            raise
         code, problems = EXIT_PROBLEM, [show_fault(command, error, debug)]
     if json_file is not None:
         _write_json(json_file, report, problems, code)
@@ -133,7 +144,7 @@ def show_problems(command: str, problems: list[Problem]) -> None:
         typer.echo(f"    → {problem.do}.", err=True)
 
 
-def show_fault(command: str, error: Exception, debug: bool) -> Problem:
+def show_fault(command: str, error: BaseException, debug: bool) -> Problem:
     """Print an exception that nobody foresaw, and return it as a problem."""
     if debug:
         typer.echo("".join(traceback.format_exception(error)), err=True)
@@ -183,12 +194,35 @@ def as_data(value: Any) -> Any:
     return str(value)
 
 
+def _is_device(path: Path) -> bool:
+    """Return whether `path` is a pipe, a terminal or the like, which a file must not take the place of."""
+    return path.exists() and not path.is_file() and not path.is_dir()
+
+
+def _unwritable(path: Path) -> Problem | None:
+    if _is_device(path):
+        return None
+    if path.is_dir():
+        return Problem(f"--json {path}", "is a folder, and a file is needed", "Give the name of a file")
+    if not path.parent.is_dir():
+        return Problem(f"--json {path}", "its folder does not exist", "Make the folder, or choose another")
+    if not os.access(path.parent, os.W_OK):
+        return Problem(f"--json {path}", "this account may not write in its folder", "Choose another folder")
+    return None
+
+
 def _write_json(path: Path, report: Report, problems: list[Problem], code: int) -> None:
     data = {"command": report.command, "exit_code": code, "problems": as_data(problems), **report.data}
+    text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
     temporary = path.with_name(path.name + ".partial")
     try:
-        temporary.write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        if _is_device(path):
+            path.write_text(text, encoding="utf-8")
+            return
+        temporary.write_text(text, encoding="utf-8")
         os.replace(temporary, path)
     except OSError as error:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
         typer.echo(f"impasto {report.command}: could not write {path}: {error.strerror}", err=True)
         sys.exit(code or EXIT_PROBLEM)
