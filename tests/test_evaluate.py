@@ -10,6 +10,7 @@ import tifffile
 import impasto
 from impasto.errors import OptionError
 from impasto.fit import FitOptions
+from impasto.store.borrow import borrowed_stack
 
 MODEL = "torrance-sparrow"
 HELD = ("light-003", "light-009")
@@ -25,6 +26,23 @@ def test_the_store_and_its_neighbourhood_stay_as_they_are(painting):
     before = listing(painting.parent)
     impasto.evaluate(painting, models=["phong"], held_out=1)
     assert listing(painting.parent) == before
+
+
+def test_only_what_no_run_holds_any_more_is_swept(painting, tmp_path):
+    store = tmp_path / "p.zarr"
+    shutil.copytree(painting, store)
+    left, foreign = tmp_path / ".p.zarr.abcd_123.partial", tmp_path / ".q.zarr.abcd_123.partial"
+    for folder in (left, foreign):
+        (folder / "p.zarr").mkdir(parents=True)
+        (folder / "p.zarr" / "stack").symlink_to(store / "stack")
+    with borrowed_stack(store) as first:
+        assert not left.exists()
+        with borrowed_stack(store) as second:
+            assert {first, second} == {folder / "p.zarr" for folder in tmp_path.glob(".p.zarr.*")}
+        assert (first / "stack" / "zarr.json").is_file()
+    assert foreign.is_dir()
+    assert sorted(path.name for path in tmp_path.iterdir()) == [foreign.name, "p.zarr"]
+    assert (store / "stack" / "zarr.json").is_file()
 
 
 def test_held_out_photographs_do_not_enter_the_fit(capture, painting, tmp_path, monkeypatch):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import glob
 import os
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from impasto.errors import StoreError, raise_problems
@@ -19,7 +20,7 @@ from impasto.store.layout import STACK
 def borrowed_stack(store: Path) -> Iterator[Path]:
     """Make a store beside `store` that shares its stack and has no fits; it is gone after the block.
 
-    Nothing of the stack is copied: the second store refers to it.
+    Nothing of the stack is copied: the second store refers to it. What a killed run left of its own is removed.
 
     Parameters
     ----------
@@ -38,17 +39,48 @@ def borrowed_stack(store: Path) -> Iterator[Path]:
     """
     raise_problems(StoreError, source_problems(store))
     store = store.resolve()
+    _sweep(store)
     with writing(store, "a temporary store beside it"):
         folder = Path(tempfile.mkdtemp(prefix=f".{store.name}.", suffix=".partial", dir=store.parent))
+    with _held(folder):
+        try:
+            second = folder / store.name
+            with writing(store, "a temporary store beside it"):
+                second.mkdir()
+                shutil.copyfile(store / "zarr.json", second / "zarr.json")
+                try:
+                    os.symlink(store / STACK, second / STACK, target_is_directory=True)
+                except OSError:  # file systems without symbolic links
+                    shutil.copytree(store / STACK, second / STACK, copy_function=os.link)
+            yield second
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _sweep(store: Path) -> None:
+    """Remove temporary stores beside `store` that no process holds any more."""
+    for folder in store.parent.glob(f".{glob.escape(store.name)}.????????.partial"):
+        with _held(folder) as free:
+            if free:
+                shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
+def _held(folder: Path) -> Iterator[bool]:
+    """Hold a folder until the block, or the process, ends; yield whether nobody else does, for certain."""
     try:
-        second = folder / store.name
-        with writing(store, "a temporary store beside it"):
-            second.mkdir()
-            shutil.copyfile(store / "zarr.json", second / "zarr.json")
-            try:
-                os.symlink(store / STACK, second / STACK, target_is_directory=True)
-            except OSError:  # file systems without symbolic links
-                shutil.copytree(store / STACK, second / STACK, copy_function=os.link)
-        yield second
+        import fcntl
+    except ImportError:  # Windows
+        yield False
+        return
+    free = False
+    descriptor = None
+    try:
+        with suppress(OSError):  # held by another process, just removed, or no locks on this file system
+            descriptor = os.open(folder, os.O_RDONLY)
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            free = True
+        yield free
     finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        if descriptor is not None:
+            os.close(descriptor)
