@@ -143,6 +143,12 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
         }
     }
 
+    /// Adds information from elsewhere: that a lobe's magnitude is 0 with this weight.
+    #[inline(always)]
+    pub fn add_ridge(&mut self, lobe: usize, weight: Lane<FMA>) {
+        self.specular_specular[lobe][lobe] = self.specular_specular[lobe][lobe] + weight;
+    }
+
     /// Eliminates the channels' blocks.
     #[inline(always)]
     fn factor(&self, lobes: usize, free: &Free<C>) -> Factored<FMA, C> {

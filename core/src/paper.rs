@@ -53,6 +53,11 @@ impl Model for UniformAmbient {
         basis.specular[0] = N::splat(1.0);
         basis
     }
+
+    #[inline(always)]
+    fn specular_scale<N: Number>(_shape: &[N]) -> N {
+        N::splat(1.0)
+    }
 }
 
 /// The result of the diffuse stage.
@@ -146,6 +151,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
         let enough = !self.far.usable_lights.lt(Lane::splat(unknowns as f64));
         let mut problem: Separable<'_, D, FMA, C, 2> =
             Separable::new(&self.far, colour, self.options.optics, Loss::Linear, false, &mut self.diffuse_scratch);
+        problem.prior = false;
         let outcome = minimise(&mut problem, &begin, enough, self.options.max_steps);
         let solution = problem.solve(&outcome.point);
         problem.give_back(&mut self.diffuse_scratch);
@@ -206,6 +212,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
         };
         let mut problem: Separable<'_, M, FMA, C, 3> =
             Separable::new(&self.group, self.colour, self.options.optics, Loss::Linear, false, &mut self.scratch);
+        problem.prior = false;
         problem.fixed_specular = Some(specular);
         let outcome = minimise(&mut problem, &begin, diffuse.enough, self.options.max_steps);
         let solution = problem.solve(&outcome.point);

@@ -50,8 +50,13 @@ pub struct Separable<'a, M, const FMA: bool, const C: usize, const P: usize> {
     pub channels: usize,
     /// Specular magnitude where it is known beforehand, as one value for a whole sample.
     pub fixed_specular: Option<[Lane<FMA>; MAX_LOBES]>,
+    /// Whether weak priors stand in for highlights that no light has shown.
+    pub prior: bool,
     /// 1 / degrees of freedom.
     per_freedom: Lane<FMA>,
+    /// χ² per degree of freedom at the accepted point and at the one looked at last: the scale of the noise.
+    noise_scale: Lane<FMA>,
+    trial_noise_scale: Lane<FMA>,
     /// The loss takes residuals this many times larger for noise.
     loss_scale: Lane<FMA>,
     /// Factor of each sample's weight from the robust loss, refreshed at every accepted point.
@@ -153,6 +158,9 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
             ambient,
             channels: group.channels,
             fixed_specular: None,
+            prior: true,
+            noise_scale: Lane::splat(1.0),
+            trial_noise_scale: Lane::splat(1.0),
             per_freedom: Lane::splat(1.0) / freedom.max(Lane::splat(1.0)),
             robust,
             basis: std::mem::take(&mut scratch.basis),
@@ -238,6 +246,13 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
             let specular = array!(|j| basis.specular[j].value);
             arrow.add(lobes, basis.diffuse.value, &specular, &radiance, &self.weight(light), &self.colour);
         }
+        let specular_scale = self.specular_scale(point);
+        let ridge = self.noise_scale / (specular_scale.value * specular_scale.value);
+        if self.prior {
+            for j in 0..lobes {
+                arrow.add_ridge(j, ridge);
+            }
+        }
         let (mut magnitudes, factored) = arrow.magnitudes(lobes);
         if let Some(fixed) = self.fixed_specular {
             magnitudes.specular = fixed;
@@ -307,10 +322,30 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
             }
             quadratic.hessian[p][p] = quadratic.hessian[p][p].max(floor);
         }
-        if self.fixed_specular.is_none() {
-            self.add_prior(point, &mut quadratic);
+        self.trial_noise_scale = quadratic.cost * self.per_freedom;
+        if self.prior {
+            self.add_shape_prior(point, &mut quadratic);
+            // The other half of the ridge on the specular magnitudes: their scale follows the shape.
+            for j in 0..lobes {
+                let term = ridge * magnitudes.specular[j] * magnitudes.specular[j];
+                quadratic.cost = quadratic.cost + term;
+                for p in 2..P {
+                    let slope = specular_scale.derivative[p] / specular_scale.value;
+                    quadratic.descent[p] = term.mul_add(slope, quadratic.descent[p]);
+                }
+            }
         }
         Solution { quadratic, magnitudes, factored, following }
+    }
+
+    #[inline(always)]
+    fn specular_scale(&self, point: &Point<FMA>) -> Dual<Lane<FMA>, P> {
+        let mut shape = [Dual::constant(Lane::splat(0.0)); MAX_SHAPE];
+        for i in 0..P - 2 {
+            let value = point.shape_log[i].exp();
+            shape[i] = Dual::parameter(value, 2 + i, value);
+        }
+        M::specular_scale(&shape[..P - 2])
     }
 
     /// A weak prior on the shape, which decides only where no highlight was seen: without it a lobe too narrow to fall on any
@@ -319,11 +354,10 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
     /// The noise is known only roughly, so its scale is taken from the residuals: to minimise n ln χ² + p, the log posterior
     /// of n degrees of freedom under a prior −p/2, is to minimise χ² (1 + p/n) near the minimum.
     #[inline(always)]
-    fn add_prior(&self, point: &Point<FMA>, quadratic: &mut Quadratic<FMA, P>) {
-        let scale = quadratic.cost * self.per_freedom;
+    fn add_shape_prior(&self, point: &Point<FMA>, quadratic: &mut Quadratic<FMA, P>) {
         for i in 0..P - 2 {
             let (median, deviation) = M::SHAPE[i].prior;
-            let weight = scale * Lane::splat(1.0 / (deviation * deviation));
+            let weight = self.trial_noise_scale * Lane::splat(1.0 / (deviation * deviation));
             let distance = Lane::splat(median.ln()) - point.shape_log[i];
             quadratic.cost = (weight * distance).mul_add(distance, quadratic.cost);
             quadratic.descent[2 + i] = weight.mul_add(distance, quadratic.descent[2 + i]);
@@ -482,6 +516,7 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize> Objective<FMA, P
 
     #[inline(always)]
     fn accepted(&mut self, point: &Point<FMA>, mask: LaneMask) {
+        self.noise_scale = Lane::select(mask, self.trial_noise_scale, self.noise_scale);
         if self.loss != Loss::Linear && mask.any() {
             let magnitudes = self.solve(point).magnitudes;
             self.reweight(&magnitudes, mask);

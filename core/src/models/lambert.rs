@@ -25,4 +25,9 @@ impl Model for Lambert {
         let (normal_light, _, visible) = facing(normal, at);
         Basis { diffuse: N::select(visible, normal_light, zero), specular: [zero; MAX_LOBES] }
     }
+
+    #[inline(always)]
+    fn specular_scale<N: Number>(_shape: &[N]) -> N {
+        N::splat(1.0)
+    }
 }

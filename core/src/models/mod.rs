@@ -72,6 +72,10 @@ pub trait Model {
     const STARTS: &'static [[f64; MAX_SHAPE]];
 
     fn basis<N: Number>(normal: [N; 3], shape: &[N], at: &Illumination<N::Real>, optics: &Optics) -> Basis<N>;
+
+    /// The specular magnitude of a lobe that reflects four times what a smooth varnish does (κ = 4): the standard deviation
+    /// of the magnitude's prior. A metal's can be six times that.
+    fn specular_scale<N: Number>(shape: &[N]) -> N;
 }
 
 /// Calls `$callback! { (name, type, ambient) … }` with every model that has a name: the list that the fit, the renderer,

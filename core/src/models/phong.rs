@@ -50,4 +50,10 @@ impl Model for Phong {
         let lobe = (shape[0] * cosine_minus_one.ln_1p()).exp();
         Basis { diffuse: N::select(visible, normal_light, zero), specular: [N::select(lit, lobe, zero)] }
     }
+
+    /// A lobe of exponent s takes in as much light as facets of c² = 1/(2 s) do: As = κ F(0) s / 2.
+    #[inline(always)]
+    fn specular_scale<N: Number>(shape: &[N]) -> N {
+        shape[0].scale(N::Real::splat(0.08))
+    }
 }

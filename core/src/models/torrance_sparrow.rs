@@ -37,4 +37,10 @@ impl<D: Distribution, G: Masking> Model for TorranceSparrow<D, G> {
         };
         Basis { diffuse: N::select(visible, normal_light, zero), specular: [N::select(visible, lobe, zero)] }
     }
+
+    /// As = κ / (4 c²); facets of Gaussian width m take in what those of c = m do.
+    #[inline(always)]
+    fn specular_scale<N: Number>(shape: &[N]) -> N {
+        N::splat(1.0) / (shape[0] * shape[0])
+    }
 }
