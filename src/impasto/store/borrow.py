@@ -20,7 +20,7 @@ from impasto.store.layout import STACK
 def borrowed_stack(store: Path) -> Iterator[Path]:
     """Make a store beside `store` that shares its stack and has no fits; it is gone after the block.
 
-    Nothing of the stack is copied: the second store refers to it. What a killed run left of its own is removed.
+    Nothing of the stack is copied: the second store refers to it. What killed runs left of theirs is removed.
 
     Parameters
     ----------
