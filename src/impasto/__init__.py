@@ -4,21 +4,28 @@ Each stage is a function with the name of its subcommand; each can be used witho
 store as an xarray DataTree.
 """
 
-from importlib.metadata import version
+from __future__ import annotations
 
-from impasto import models
-from impasto.capture.simulate import simulate
-from impasto.demo import demo
-from impasto.errors import ImpastoError
-from impasto.evaluate import evaluate
-from impasto.fit import FitOptions, fit
-from impasto.geometry import Camera, Lights
-from impasto.maps import maps
-from impasto.render import render
-from impasto.stack import stack
-from impasto.store import open
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
-__version__ = version("impasto")
+if TYPE_CHECKING:
+    from impasto import models
+    from impasto.capture.simulate import simulate
+    from impasto.demo import demo
+    from impasto.errors import ImpastoError
+    from impasto.evaluate import evaluate
+    from impasto.fit import fit
+    from impasto.geometry import Camera, Lights
+    from impasto.maps import maps
+    from impasto.procedure import FitOptions
+    from impasto.render import render
+    from impasto.stack import stack
+    from impasto.store import open
+
+    __version__: str
 
 __all__ = [
     "Camera",
@@ -35,3 +42,45 @@ __all__ = [
     "simulate",
     "stack",
 ]
+
+# Where each name is found when it is asked for: a stage does not import what the others need.
+_HOME = {
+    "Camera": "geometry",
+    "FitOptions": "procedure",
+    "ImpastoError": "errors",
+    "Lights": "geometry",
+    "demo": "demo",
+    "evaluate": "evaluate",
+    "fit": "fit",
+    "maps": "maps",
+    "models": "models",
+    "open": "store",
+    "render": "render",
+    "simulate": "capture.simulate",
+    "stack": "stack",
+}
+
+
+class _Package(ModuleType):
+    """The package, in which a stage's name always means the function and never its module."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "__version__":
+            from importlib.metadata import version
+
+            return version(__name__)
+        if name not in _HOME:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        home = import_module(f"{__name__}.{_HOME[name]}")
+        value = home if name == "models" else getattr(home, name)
+        setattr(self, name, value)
+        return value
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        # Python makes a module that it has imported an attribute of the package.
+        if isinstance(value, ModuleType) and name in _HOME and name != "models":
+            value = getattr(value, name)
+        super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

@@ -11,7 +11,6 @@ import impasto
 from impasto.console import reporting
 from impasto.errors import OptionError, Problem
 from impasto.fit import PROCEDURES, FitOptions
-from impasto.render_lights import parse_angles, parse_light
 from impasto.summaries import (
     evaluate_tables,
     fit_lines,
@@ -266,6 +265,8 @@ def render(
 ) -> None:
     """Render the painting under any light."""
     with reporting("render", json, debug) as report:
+        from impasto.render_lights import parse_angles, parse_light
+
         summary = impasto.render(
             store,
             model=model,

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
-from impasto.capture.simulate import Simulation
-from impasto.evaluate import EvaluateSummary
-from impasto.fit import FitSummary, ModelFit
-from impasto.maps import MapsSummary
-from impasto.models import ModelSpec
-from impasto.render import RenderSummary
-from impasto.stack import StackSummary
+if TYPE_CHECKING:
+    from impasto.capture.simulate import Simulation
+    from impasto.evaluate import EvaluateSummary
+    from impasto.fit import FitSummary, ModelFit
+    from impasto.maps import MapsSummary
+    from impasto.models import ModelSpec
+    from impasto.render import RenderSummary
+    from impasto.stack import StackSummary
 
 Row = Sequence[str]
 
