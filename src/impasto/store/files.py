@@ -19,7 +19,7 @@ from impasto.errors import Problem, StoreError
 # EFBIG is what a limit on the size of files (ulimit -f) gives.
 _NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
-# Names of files being written: by `write_json` with a process number, by zarr-python with a UUID.
+# Names of files being written: by `write_whole` with a process number, by zarr-python with a UUID.
 _PARTIAL = re.compile(r".+\.(\d+|[0-9a-f]{32})\.partial")
 
 # What decoders raise on a chunk with a wrong checksum, cut off, or empty.
@@ -30,18 +30,23 @@ _OS_ERROR = re.compile(r"\(os error (\d+)\)")
 
 
 def write_json(path: Path, value: Mapping[str, Any]) -> None:
-    """Write `value` to `path` so that a kill leaves the old file or the new one, never a part.
+    """Write `value` to `path`, whole or not at all.
 
     Raises
     ------
     ValueError
         If `value` holds NaN or an infinity, which JSON has no word for.
     """
-    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
+    write_whole(path, json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False).encode())
+
+
+def write_whole(path: Path, *parts: bytes) -> None:
+    """Write `parts`, one after the other; a kill leaves the old file or the new one, never a part of it."""
     temporary = path.with_name(f"{path.name}.{os.getpid()}.partial")
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
-        temporary.write_text(text, encoding="utf-8")
+        with temporary.open("wb") as file:
+            file.writelines(parts)
         os.replace(temporary, path)
     except OSError:
         temporary.unlink(missing_ok=True)

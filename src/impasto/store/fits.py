@@ -16,18 +16,17 @@ from impasto.store.files import DAMAGE, reading, writing
 from impasto.store.hierarchy import (
     Attributes,
     coarser_group,
-    create_map,
     fit_group,
     has_array,
     lost_pieces,
     open_array,
-    open_sharded,
     read_group,
     remove,
     source_problems,
     write_group,
 )
 from impasto.store.layout import FITS, PYRAMIDS, Map, Unit, status_counts, units
+from impasto.store.shards import write_metadata, write_shard
 
 if TYPE_CHECKING:
     import zarr
@@ -75,8 +74,12 @@ class MapsWriter:
             write_group(store, group, {**self._attributes, "complete": False})
         for map in maps:
             if not has_array(store, f"{group}/{map.name}"):
-                create_map(store, group, map, height, width)
-        self._arrays = {map.name: open_sharded(store, f"{group}/{map.name}") for map in maps}
+                with writing(store, f"{group}/{map.name}"):
+                    write_metadata(store / group / map.name, map, height, width)
+
+    @cached_property
+    def _status(self) -> zarr.Array[Any]:
+        return open_array(self.store, f"{self.group}/status")
 
     def _shard(self, map: Map, unit: Unit) -> Path:
         last = () if map.axis is None else ("0",)
@@ -88,7 +91,7 @@ class MapsWriter:
         if not self._shard(status, unit).is_file():
             return False
         try:
-            self._arrays["status"][unit.rows, unit.columns]
+            self._status[unit.rows, unit.columns]
         except DAMAGE:  # as good as not there
             return False
         return True
@@ -116,23 +119,20 @@ class MapsWriter:
             self.write_map(unit, map, values[map.name])
 
     def begin(self, unit: Unit) -> None:
-        """Forget what there is of a unit.
-
-        Where the image ends inside of a shard, what is there would be read first, and might be damaged.
-        """
+        """Forget what there is of a unit, so that it does not count as whole while it is written anew."""
         for map in reversed(self.maps):
             self._shard(map, unit).unlink(missing_ok=True)
 
     def write_map(self, unit: Unit, map: Map, values: NDArray[Any]) -> None:
         """Write one map of a unit; the caller sees to it that ``status`` is the last."""
         with writing(self.store, f"{self.group}/{map.name}"):
-            self._arrays[map.name][unit.rows, unit.columns] = np.asarray(values, map.dtype)
+            write_shard(self._shard(map, unit), map, values)
 
     def status_counts(self) -> NDArray[np.int64]:
         """Return how many pixels have each status, as an ndarray of shape (256,), int64."""
         counts = np.zeros(256, np.int64)
         for unit in units(self.height, self.width):
-            counts += status_counts(np.asarray(self._arrays["status"][unit.rows, unit.columns]))
+            counts += status_counts(np.asarray(self._status[unit.rows, unit.columns]))
         return counts
 
     def finish(self, more: Mapping[str, Any]) -> None:

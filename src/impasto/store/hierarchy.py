@@ -1,7 +1,8 @@
 """Groups and arrays of a store's Zarr v3 hierarchy.
 
-Groups are small JSON documents, written here directly and atomically; arrays go through zarr-python with the
-`zarrs` codec pipeline. zarr takes a third of a second to import, so that happens where an array is touched.
+Groups are small JSON documents, written here directly and atomically. Arrays are read through zarr-python
+with the `zarrs` codec pipeline; large ones are written by `chunks` and `shards`. zarr takes a sixth of a
+second to import, so that happens where an array is touched.
 """
 
 from __future__ import annotations
@@ -15,33 +16,32 @@ from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from impasto.errors import Problem, StoreError
 from impasto.store.files import is_partial, write_json, writing
-from impasto.store.layout import FITS, INNER_CHUNK, PYRAMIDS, SCHEMA, STACK, STACK_CHUNK, UNIT, Map
+from impasto.store.layout import FITS, PYRAMIDS, SCHEMA, STACK, STACK_CHUNK, ZSTD, stack_fill_value
 
 if TYPE_CHECKING:
     import zarr
 
 Attributes = dict[str, Any]
 
-_RUST = "zarrs.ZarrsCodecPipeline"
-_PYTHON = "zarr.core.codec_pipeline.BatchedCodecPipeline"
+_PIPELINE = "zarrs.ZarrsCodecPipeline"
 
 # zarr's configuration is global to the process, and so is this lock.
 _configuring = threading.Lock()
 
 
 @contextmanager
-def _pipeline(path: str = _RUST) -> Iterator[None]:
-    """Have arrays opened inside use a codec pipeline, without changing zarr for the rest of the program."""
+def _pipeline() -> Iterator[None]:
+    """Have arrays opened inside use the Rust codecs, without changing zarr for the rest of the program."""
     import zarr
 
-    with _configuring, zarr.config.set({"codec_pipeline.path": path, "array.write_empty_chunks": True}):
+    with _configuring, zarr.config.set({"codec_pipeline.path": _PIPELINE}):
         yield
 
 
@@ -160,25 +160,7 @@ def create_stack_array(
         dtype=dtype,
         dimension_names=("light", "y", "x", "channel"),
         chunks=(1, STACK_CHUNK, STACK_CHUNK, shape[3]),
-        # A chunk that is lost reads as overexposed or missing, never as dark.
-        fill_value=float("nan") if dtype.kind == "f" else np.iinfo(dtype).max,
-        attributes=attributes,
-    )
-
-
-def create_map(store: Path, group: str, map: Map, height: int, width: int) -> None:
-    """Create the array of one map of a fit or of a coarser level, sharded by units."""
-    axis = () if map.axis is None else (map.size,)
-    attributes: Attributes = {"long_name": map.long_name, "units": map.units}
-    _create(
-        store,
-        f"{group}/{map.name}",
-        shape=map.shape(height, width),
-        dtype=np.dtype(map.dtype),
-        dimension_names=map.dims,
-        chunks=(INNER_CHUNK, INNER_CHUNK, *axis),
-        shards=(UNIT, UNIT, *axis),
-        fill_value=map.fill_value,
+        fill_value=stack_fill_value(dtype),
         attributes=attributes,
     )
 
@@ -211,43 +193,25 @@ def _create(store: Path, path: str, **arguments: Any) -> zarr.Array[Any]:
     import zarr
     from zarr.codecs import ZstdCodec
 
-    # Level -1 writes 16-bit photographs and maps, whose last bits are noise, faster than lz4 does, and
-    # shrinks decoded 8-bit ones to half. The checksum is zstd's own, because a crc32c after the compressor is
-    # not looked at when a part of a chunk is read.
-    compressor = ZstdCodec(level=-1, checksum=True)
     with writing(store, path), _pipeline():
         return zarr.create_array(
-            store, name=path, zarr_format=3, overwrite=True, compressors=[compressor], **arguments
+            store, name=path, zarr_format=3, overwrite=True, compressors=[ZstdCodec(**ZSTD)], **arguments
         )
 
 
-def open_array(store: Path, path: str, *, write: bool = False) -> zarr.Array[Any]:
-    """Open an array of a store to read it, or to write chunks that are not sharded.
+def open_array(store: Path, path: str) -> zarr.Array[Any]:
+    """Open an array of a store to read it.
 
     Raises
     ------
     StoreError
         If it is not there or its metadata cannot be read.
     """
-    return _open(store, path, _RUST, "r+" if write else "r")
-
-
-def open_sharded(store: Path, path: str) -> zarr.Array[Any]:
-    """Open an array of a store to write shards; errors as for `open_array`.
-
-    The Rust codecs put the chunks of a shard one after the other as their threads finish, so that the same
-    pixels give other bytes each time. Those of zarr-python keep an order, replace shards atomically, and cost
-    no more time.
-    """
-    return _open(store, path, _PYTHON, "r+")
-
-
-def _open(store: Path, path: str, pipeline: str, mode: Literal["r", "r+"]) -> zarr.Array[Any]:
     import zarr
 
     try:
-        with _pipeline(pipeline):
-            return zarr.open_array(store, path=path, mode=mode, zarr_format=3)
+        with _pipeline():
+            return zarr.open_array(store, path=path, mode="r", zarr_format=3)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise StoreError(
             Problem(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,11 @@ PYRAMIDS = "pyramids"
 STACK_CHUNK = 512
 UNIT = 1024
 INNER_CHUNK = 256
+
+# How chunks are compressed. Level -1 writes 16-bit photographs and maps, whose last bits are noise, faster
+# than lz4 does, and shrinks decoded 8-bit ones to half. The checksum is zstd's own, because a crc32c after
+# the compressor is not looked at when a part of a chunk is read.
+ZSTD: dict[str, Any] = {"level": -1, "checksum": True}
 
 # Levels stop where a picture fits on a screen at once.
 SMALLEST_LEVEL = 512
@@ -42,6 +48,11 @@ STATUS_MEANING = {
 # From harmless to worst, for the status of a coarser pixel: "too few lights" and "all clipped" leave a pixel
 # without any value, "not identified" without some.
 STATUS_SEVERITY = (0, 2, 1, 5, 4, 3, 255)
+
+
+def stack_fill_value(dtype: np.dtype) -> float | int:
+    """Return what a sample of the stack reads as if its chunk is lost: overexposed or missing, never dark."""
+    return float("nan") if dtype.kind == "f" else int(np.iinfo(dtype).max)
 
 
 @dataclass(frozen=True)

@@ -14,20 +14,18 @@ from numpy.typing import NDArray
 
 from impasto.errors import Problem, StoreError
 from impasto.geometry import Camera, Lights
-from impasto.store.files import digest, writing
+from impasto.store.chunks import encode_chunks
+from impasto.store.files import digest, write_whole, writing
 from impasto.store.hierarchy import (
     Attributes,
     create_stack_array,
-    lost_pieces,
-    open_array,
-    open_sharded,
     provenance,
     read_group,
     remove,
     write_group,
     write_table,
 )
-from impasto.store.layout import FITS, PYRAMIDS, SCHEMA, STACK, STACK_CHUNK
+from impasto.store.layout import FITS, PYRAMIDS, SCHEMA, STACK, STACK_CHUNK, stack_fill_value
 
 _TABLES: dict[str, tuple[tuple[str, ...], Attributes]] = {
     "light_name": (("light",), {"long_name": "name of the photograph"}),
@@ -146,7 +144,6 @@ class StackWriter:
         self._header = header
         self._writing = threading.Lock()
         self._attributes = self._begin({**provenance(), **header.attributes()}, fresh)
-        self._radiance = open_array(store, f"{STACK}/radiance", write=True)
 
     def _begin(self, settings: Attributes, fresh: bool) -> Attributes:
         """Continue what the store holds of the same stack, or start anew; return the group's attributes."""
@@ -184,7 +181,6 @@ class StackWriter:
     def start_light(self, light: int) -> None:
         """Forget what there is of a photograph, whole or in part."""
         self._record(light, None, None)
-        # Chunks that a kill cut short would be read, and found damaged, where a band fills them in part only.
         folder = self.store / STACK / "radiance" / "c" / str(light)
         if folder.exists():
             shutil.rmtree(folder)
@@ -198,29 +194,17 @@ class StackWriter:
         row : int
             The first row; a multiple of the chunk's height, so that no chunk is written twice.
         band : ndarray of shape (rows, W, C)
-            Values as stored.
+            Values as stored; no more rows than a chunk has.
         """
+        folder = self.store / STACK / "radiance" / "c" / str(light)
+        fill_value = stack_fill_value(band.dtype)
         with writing(self.store, f"{STACK}/radiance"):
-            self._radiance[light : light + 1, row : row + band.shape[0]] = band[np.newaxis]
+            for (_, column), chunk in encode_chunks(band, STACK_CHUNK, fill_value):
+                write_whole(folder / str(row // STACK_CHUNK) / str(column) / "0", chunk)
 
     def finish_light(self, light: int, sha256: str, clipped_samples: int) -> None:
         """Record that a photograph is written whole."""
-        self._write_empty_chunks(light)
         self._record(light, sha256, clipped_samples)
-
-    def _write_empty_chunks(self, light: int) -> None:
-        """Write what the Rust codecs leave out: chunks at the image's edge that hold the fill value only.
-
-        Without them a chunk that was lost could not be told from one that is overexposed or missing.
-        """
-        path = f"{STACK}/radiance"
-        absent = lost_pieces(self.store, path, self._radiance, slice(light, light + 1))
-        if absent:
-            array = open_sharded(self.store, path)  # with zarr-python's codecs, which write all
-            with writing(self.store, path):
-                for _, row, column, _ in absent:
-                    rows, columns = (slice(n * STACK_CHUNK, (n + 1) * STACK_CHUNK) for n in (row, column))
-                    array[light : light + 1, rows, columns] = array.fill_value
 
     def _record(self, light: int, sha256: str | None, clipped_samples: int | None) -> None:
         with self._writing:
