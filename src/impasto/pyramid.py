@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -76,10 +77,19 @@ def halving(name: str) -> Callable[[NDArray[Any]], NDArray[Any]]:
     return special.get(name, halve)
 
 
+@dataclass
+class _Partial:
+    """A unit of a coarser level of which a part has been computed."""
+
+    unit: stores.Unit
+    maps: stores.Maps
+    pixels_missing: int
+
+
 class Pyramid:
     """The coarser levels of a fit.
 
-    Units of the first level are made of units of the fit while those are in memory; `finish` makes from the
+    Units of each level are made of units of the finer one while those are in memory; `finish` makes from the
     disk what is missing then.
 
     Parameters
@@ -103,7 +113,8 @@ class Pyramid:
         attributes: Mapping[str, Any],
     ) -> None:
         self._finest = stores.Fit(store, stores.fit_group(model), {})
-        self._size = size
+        sizes = stores.level_sizes(*size)
+        self._finer_sizes = [size, *sizes]
         self._levels = [
             stores.MapsWriter(
                 store,
@@ -112,16 +123,14 @@ class Pyramid:
                 *level_size,
                 {**attributes, "level": level, "px_per_px": 2**level},
             )
-            for level, level_size in enumerate(stores.level_sizes(*size), start=1)
+            for level, level_size in enumerate(sizes, start=1)
         ]
-        self._parent: stores.Unit | None = None
-        self._halves: stores.Maps = {}
-        self._pixels_missing = 0
+        self._partial: dict[int, _Partial] = {}
 
     @staticmethod
     def in_order(units: Sequence[stores.Unit]) -> list[stores.Unit]:
         """Return units of the fit in the order that `add` needs: those of one coarser unit together."""
-        return sorted(units, key=lambda unit: (unit.row // 2, unit.column // 2, unit.row, unit.column))
+        return sorted(units, key=lambda unit: _interleaved(unit.row, unit.column))
 
     def add(self, unit: stores.Unit, maps: stores.Maps) -> None:
         """Take the maps of a unit that was just written.
@@ -131,23 +140,31 @@ class Pyramid:
         StoreError
             If the disk is full.
         """
-        if not self._levels:
+        self._add(0, unit, maps)
+
+    def _add(self, number: int, unit: stores.Unit, maps: stores.Maps) -> None:
+        """Take the maps of a unit of the level below `self._levels[number]`."""
+        if number == len(self._levels):
             return
-        level = self._levels[0]
+        level = self._levels[number]
         parent = stores.unit_at(unit.row // 2, unit.column // 2, level.height, level.width)
-        if parent != self._parent:
-            self._parent = parent
-            shape = parent.height, parent.width
-            self._halves = {map.name: np.empty(map.shape(*shape), map.dtype) for map in level.maps}
-            rows, columns = _below(parent, self._size)
-            self._pixels_missing = (rows.stop - rows.start) * (columns.stop - columns.start)
+        partial = self._partial.get(number)
+        if partial is None or partial.unit != parent:
+            rows, columns = _below(parent, self._finer_sizes[number])
+            partial = self._partial[number] = _Partial(
+                parent,
+                {map.name: np.empty(map.shape(parent.height, parent.width), map.dtype) for map in level.maps},
+                (rows.stop - rows.start) * (columns.stop - columns.start),
+            )
         row, column = unit.rows.start // 2 - parent.rows.start, unit.columns.start // 2 - parent.columns.start
         for name, values in maps.items():
             half = halving(name)(values)
-            self._halves[name][row : row + half.shape[0], column : column + half.shape[1]] = half
-        self._pixels_missing -= unit.pixels
-        if self._pixels_missing == 0:
-            level.write(parent, self._halves)
+            partial.maps[name][row : row + half.shape[0], column : column + half.shape[1]] = half
+        partial.pixels_missing -= unit.pixels
+        if partial.pixels_missing == 0:
+            del self._partial[number]
+            level.write(parent, partial.maps)
+            self._add(number + 1, parent, partial.maps)
 
     def finish(self, advance: Callable[[int], None]) -> None:
         """Write what is missing of the levels; every unit of the fit must be there.
@@ -162,7 +179,7 @@ class Pyramid:
         StoreError
             If the disk is full, or a map of the finer level is damaged.
         """
-        self._halves = {}
+        self._partial.clear()
         finer = self._finest
         with ThreadPoolExecutor(_THREADS, thread_name_prefix="pyramid") as pool:
             for level in self._levels:
@@ -175,6 +192,11 @@ class Pyramid:
     def missing_pixels(self) -> int:
         """Return how many pixels `finish` has to write."""
         return sum(unit.pixels for level in self._levels for unit in level.unfinished())
+
+
+def _interleaved(row: int, column: int) -> int:
+    """Return a unit's number on a Z-shaped curve, along which the units of a coarser one lie together."""
+    return sum(((row >> bit & 1) << 2 * bit + 1) | ((column >> bit & 1) << 2 * bit) for bit in range(32))
 
 
 def _below(unit: stores.Unit, size: tuple[int, int]) -> tuple[slice, slice]:

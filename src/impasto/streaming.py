@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
@@ -13,10 +14,13 @@ from numpy.typing import NDArray
 from impasto.procedure import Procedure
 from impasto.store import STACK_CHUNK, Maps, Stack, Unit
 
-# A tile of the stack, all lights. With one tile read ahead, and one unit of maps on its way to the disk while
-# the next is filled, the whole process stays under 1 GB, whatever the size and number of the photographs. Not
-# an option, because the result must not depend on it.
+# A tile of the stack, all lights. With one tile read ahead, a few fitted ones waiting, and a unit of maps per
+# level, the whole process stays under 1 GB, whatever the size and number of the photographs. Not an option,
+# because the result must not depend on it.
 _TILE_BYTES = 64 << 20
+
+# Fitted tiles that may wait while a unit is written.
+_TILES_WAITING = 3
 
 
 def fit_units(
@@ -28,8 +32,8 @@ def fit_units(
 ) -> None:
     """Fit units and hand them on to be written.
 
-    The calling thread computes (the core has its own threads), one thread reads the next tile, one writes the
-    last unit. Ctrl-C ends after the tile and the unit under way.
+    The calling thread computes (the core has its own threads), one thread reads the next tile, one puts the
+    last tiles together and writes their units. Ctrl-C ends after the tile and the unit under way.
 
     Parameters
     ----------
@@ -47,31 +51,38 @@ def fit_units(
     StoreError
         If the stack is damaged or the disk is full.
     """
+    maps: Maps = {}
+
+    def put(before: Future[None] | None, unit: Unit, rows: slice, columns: slice, fitted: Maps) -> None:
+        if before is not None:
+            before.result()  # nothing is written after something that could not be
+        if not maps:
+            maps.update(
+                {map.name: np.empty(map.shape(unit.height, unit.width), map.dtype) for map in procedure.maps}
+            )
+        inside = (_shifted(rows, unit.rows), _shifted(columns, unit.columns))
+        for name, values in maps.items():
+            target = values[inside]
+            target[...] = fitted[name].reshape(target.shape)
+        if (rows.stop, columns.stop) == (unit.rows.stop, unit.columns.stop):
+            write(unit, maps)
+            maps.clear()
+
     with (
         closing(read_tiles(stack, procedure.lights, units)) as tiles,
         ThreadPoolExecutor(1, thread_name_prefix="write") as writer,
     ):
-        written: Future[None] | None = None
-        maps: Maps = {}
+        waiting: deque[Future[None]] = deque()
+        last: Future[None] | None = None
         for unit, rows, columns, radiance in tiles:
-            if not maps:
-                maps = {
-                    map.name: np.empty(map.shape(unit.height, unit.width), map.dtype)
-                    for map in procedure.maps
-                }
             fitted = procedure.fit(radiance, rows, columns)
-            inside = (_shifted(rows, unit.rows), _shifted(columns, unit.columns))
-            for name, values in maps.items():
-                target = values[inside]
-                target[...] = fitted[name].reshape(target.shape)
+            if len(waiting) == _TILES_WAITING:
+                waiting.popleft().result()
+            last = writer.submit(put, last, unit, rows, columns, fitted)
+            waiting.append(last)
             advance(radiance.shape[1] * radiance.shape[2])
-            if (rows.stop, columns.stop) == (unit.rows.stop, unit.columns.stop):
-                if written is not None:
-                    written.result()
-                written = writer.submit(write, unit, maps)
-                maps = {}
-        if written is not None:
-            written.result()
+        if last is not None:
+            last.result()
 
 
 def read_tiles(
