@@ -33,7 +33,17 @@ def public(kind):
 
 
 def test_commands_stand_in_the_order_of_the_pipeline():
-    assert list(COMMANDS) == ["simulate", "stack", "fit", "render", "maps", "evaluate", "models", "demo"]
+    assert list(COMMANDS) == [
+        "simulate",
+        "stack",
+        "fit",
+        "render",
+        "maps",
+        "evaluate",
+        "gloss",
+        "models",
+        "demo",
+    ]
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from impasto.demo import demo
     from impasto.errors import ImpastoError
     from impasto.evaluate import evaluate
+    from impasto.evaluate.gloss import gloss
     from impasto.fit import fit
     from impasto.geometry import Camera, Lights
     from impasto.maps import maps
@@ -35,6 +36,7 @@ __all__ = [
     "demo",
     "evaluate",
     "fit",
+    "gloss",
     "maps",
     "models",
     "open",
@@ -52,6 +54,7 @@ _HOME = {
     "demo": "demo",
     "evaluate": "evaluate",
     "fit": "fit",
+    "gloss": "evaluate.gloss",
     "maps": "maps",
     "models": "models",
     "open": "store",

@@ -14,6 +14,8 @@ from impasto.fit import PROCEDURES, FitOptions
 from impasto.summaries import (
     evaluate_tables,
     fit_lines,
+    gloss_lines,
+    gloss_table,
     maps_lines,
     model_lines,
     render_lines,
@@ -322,6 +324,32 @@ def evaluate(
         report.done(summary)
 
 
+@app.command(epilog="Example: impasto gloss painting.zarr --model torrance-sparrow --regions drawn.png")
+def gloss(
+    store: Store,
+    model: Model,
+    regions: Annotated[
+        Path | None,
+        typer.Option("--regions", metavar="FILE", help="Picture with a colour per region, black outside."),
+    ] = None,
+    pixel: Annotated[
+        list[str] | None,
+        typer.Option("--pixel", metavar="COLUMN,ROW", help="A single pixel; may be repeated."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for a map of each angle.")
+    ] = None,
+    json: Json = None,
+    debug: Debug = False,
+) -> None:
+    """Predict what a glossmeter would read at 20, 60 and 85°."""
+    with reporting("gloss", json, debug) as report:
+        summary = impasto.gloss(store, model=model, regions=regions, pixels=_pixels(pixel), out=out)
+        report.table(*gloss_table(summary))
+        report.say_all(gloss_lines(summary))
+        report.done(summary)
+
+
 @app.command(epilog="Example: impasto models")
 def models(json: Json = None, debug: Debug = False) -> None:
     """List the reflectance models."""
@@ -360,13 +388,19 @@ def _threshold(text: str) -> float | None:
 
 
 def _size(text: str) -> tuple[int, int]:
+    return _pair(text.replace("x", ","), "--size", "Write width and height: --size 768,512")
+
+
+def _pixels(texts: list[str] | None) -> list[tuple[int, int]]:
+    return [_pair(text, "--pixel", "Write column and row: --pixel 120,80") for text in texts or ()]
+
+
+def _pair(text: str, option: str, do: str) -> tuple[int, int]:
     try:
-        width, height = (int(part) for part in text.replace("x", ",").split(","))
+        first, second = (int(part) for part in text.split(","))
     except ValueError:
-        raise OptionError(
-            Problem(f"--size {text}", "is not two whole numbers", "Write width and height: --size 768,512")
-        ) from None
-    return width, height
+        raise OptionError(Problem(f"{option} {text}", "is not two whole numbers", do)) from None
+    return first, second
 
 
 def main() -> None:

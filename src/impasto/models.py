@@ -8,8 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from impasto import _core
 from impasto.errors import OptionError, Problem
+from impasto.geometry import Array
 
 
 @dataclass(frozen=True)
@@ -102,3 +105,37 @@ def parse_model(name: str) -> ModelSpec:
             do=f"Choose one of {', '.join(MODELS)}",
         )
     )
+
+
+def basis(
+    model: ModelSpec,
+    normal: Array,
+    light: Array,
+    view: Array,
+    shape: Array,
+    *,
+    index: float = 1.5,
+    fresnel: str = "facet",
+) -> tuple[Array, Array]:
+    """Return the model's basis functions, of which relative radiance is the sum weighted by the magnitudes.
+
+    Parameters
+    ----------
+    model : ModelSpec
+    normal, light, view : ndarray of shape (P, 3), float64
+        Unit vectors.
+    shape : ndarray of shape (P, S), float64
+        Shape parameters, in the model's order.
+    index : float, optional
+        Index of refraction of the surface.
+    fresnel : {'facet', 'element'}, optional
+        Whose angle of incidence Fresnel's equations take.
+
+    Returns
+    -------
+    diffuse : ndarray of shape (P,)
+    specular : ndarray of shape (P, lobes)
+    """
+    rows = [np.ascontiguousarray(each, dtype=np.float64) for each in (normal, light, view, shape)]
+    values = _core.basis(model.name, *rows, index=index, fresnel=fresnel)
+    return values[:, 0], values[:, 1 : 1 + model.lobes]

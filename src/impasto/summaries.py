@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from impasto.capture.simulate import Simulation
     from impasto.evaluate import EvaluateSummary
+    from impasto.evaluate.gloss import GlossSummary
     from impasto.fit import FitSummary, ModelFit
     from impasto.maps import MapsSummary
     from impasto.models import ModelSpec
@@ -106,6 +107,42 @@ def evaluate_tables(summary: EvaluateSummary) -> Iterator[tuple[str, Row, list[R
         rows.append(("mean", "", f"{mean.psnr_db:.2f}", f"{mean.ssim:.4f}", f"{mean.rms_relative:#.4g}"))
         how = "fitted again without them" if model.refitted else "the fit in the store has not seen them"
         yield f"{model.model} ({model.procedure}; {how})", header, rows
+
+
+def gloss_table(summary: GlossSummary) -> tuple[Row, list[Row]]:
+    """Return the columns' names, and a row per region: its readings, and its pixels' in brackets."""
+    angles = [reading.angle_deg for reading in summary.regions[0].readings]
+    rows: list[Row] = []
+    for region in summary.regions:
+        cells = [
+            f"{reading.gloss:.4g}"
+            + (f" ({reading.low:.3g} – {reading.high:.3g})" if region.pixels > 1 else "")
+            for reading in region.readings
+        ]
+        rows.append((region.name, *cells, f"{region.haze:.3g}"))
+    return ("gloss", *(f"{angle:.0f}°" for angle in angles), "haze (60° − 20°)"), rows
+
+
+def gloss_lines(summary: GlossSummary) -> Iterator[str]:
+    """Yield how the readings are to be taken."""
+    yield "in brackets: 5th to 95th percentile of the pixels, each as a flat sample"
+    if not summary.absolute:
+        yield (
+            "relative gloss: no white reference scales this stack, so numbers compare within it only; "
+            "see impasto calibrate white"
+        )
+    if summary.extrapolated_deg:
+        angles = ", ".join(f"{angle:.0f}°" for angle in summary.extrapolated_deg)
+        low, high = summary.facet_angle_deg
+        yield (
+            f"{angles}: beyond the lights, which met mirroring facets at {low:.0f} to {high:.0f}°; "
+            "the reading rests on the model there"
+        )
+    unknown = summary.regions[0].unknown_pixels
+    if unknown:
+        yield f"{_count(unknown, 'pixel')} left out: their highlight is not known"
+    if summary.files:
+        yield f"maps in {summary.files[0].parent}"
 
 
 def model_lines(spec: ModelSpec) -> Iterator[str]:

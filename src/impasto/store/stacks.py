@@ -125,6 +125,11 @@ class Stack:
         return str(self.attributes.get("light_rgb_source", ASSUMED_WHITE))
 
     @property
+    def absolute(self) -> bool:
+        """Whether relative radiance 1 is a perfect white diffuser lit along its normal."""
+        return bool(self.attributes.get("white_reference"))
+
+    @property
     def sha256(self) -> str:
         """A digest of the stack's settings and of the contents of every photograph."""
         photographs = [entry["sha256"] for entry in self.attributes["inputs"]]
