@@ -9,8 +9,8 @@ import impasto
 from impasto.errors import OptionError
 from impasto.evaluate.gloss import PixelGloss, region_gloss
 from impasto.evaluate.glossmeter import GLOSSMETERS
-from impasto.evaluate.pixels import Pixels
 from impasto.models import parse_model
+from impasto.pixels import Pixels
 
 OPTICS = {"index_of_refraction": 1.5, "fresnel": "facet"}
 
@@ -18,17 +18,16 @@ OPTICS = {"index_of_refraction": 1.5, "fresnel": "facet"}
 def flat_pixels(model, shape, *, kappa=1.0, albedo=0.0, count=1):
     spec = parse_model(model)
     return Pixels(
-        model=spec,
+        attributes={"model": model, "light_rgb": [1.0, 1.0, 1.0], **OPTICS},
+        size=(1, count),
         row=np.zeros(count, int),
         column=np.arange(count),
         normal=np.tile([0.0, 0.0, 1.0], (count, 1)),
         diffuse=np.full((count, 3), albedo),
         specular=np.full((count, spec.lobes), kappa / (4 * shape**2)),
         shape=np.full((count, 1), shape),
-        ambient=np.zeros((count, 3)),
-        light_rgb=np.ones(3),
-        index=1.5,
-        fresnel="facet",
+        ambient=None,
+        view_tilt=None,
     )
 
 

@@ -190,7 +190,14 @@ def pixel_position_mm(
     ndarray of shape (rows * columns, 2), float32
         X and Y in mm of each pixel's centre, rows first; row 0 is the top of the painting.
     """
-    x = (np.arange(columns.start, columns.stop) - (width - 1) / 2) * mm_per_px
-    y = -(np.arange(rows.start, rows.stop) - (height - 1) / 2) * mm_per_px
-    grid_y, grid_x = np.meshgrid(y, x, indexing="ij")
-    return np.stack([grid_x.ravel(), grid_y.ravel()], axis=-1).astype(np.float32)
+    row, column = np.mgrid[rows.start : rows.stop, columns.start : columns.stop].reshape(2, -1)
+    return position_mm(row, column, height, width, mm_per_px)
+
+
+def position_mm(
+    row: ArrayLike, column: ArrayLike, height: int, width: int, mm_per_px: float
+) -> NDArray[np.float32]:
+    """Return where pixels (...) lie on the painting, as (..., 2); see `pixel_position_mm`."""
+    x = (np.asarray(column) - (width - 1) / 2) * mm_per_px
+    y = -(np.asarray(row) - (height - 1) / 2) * mm_per_px
+    return np.stack([x, y], axis=-1).astype(np.float32)

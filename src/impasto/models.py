@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from impasto import _core
 from impasto.errors import OptionError, Problem
@@ -109,10 +110,10 @@ def parse_model(name: str) -> ModelSpec:
 
 def basis(
     model: ModelSpec,
-    normal: Array,
-    light: Array,
-    view: Array,
-    shape: Array,
+    normal: ArrayLike,
+    light: ArrayLike,
+    view: ArrayLike,
+    shape: ArrayLike,
     *,
     index: float = 1.5,
     fresnel: str = "facet",
@@ -122,9 +123,9 @@ def basis(
     Parameters
     ----------
     model : ModelSpec
-    normal, light, view : ndarray of shape (P, 3), float64
+    normal, light, view : ndarray of shape (P, 3)
         Unit vectors.
-    shape : ndarray of shape (P, S), float64
+    shape : ndarray of shape (P, S)
         Shape parameters, in the model's order.
     index : float, optional
         Index of refraction of the surface.

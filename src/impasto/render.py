@@ -15,14 +15,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto import _core
 from impasto.animation import Animation
 from impasto.band_writers import BandWriter
 from impasto.colour import encode_srgb
 from impasto.errors import OptionError, Problem
-from impasto.geometry import Camera, Lights, pixel_position_mm, turn_about_z
+from impasto.geometry import Camera, Lights
 from impasto.models import parse_model
 from impasto.output import prepare_folder
+from impasto.pixels import read_pixels, render_pixels
 from impasto.progress import progress
 from impasto.render_lights import requested_lights
 from impasto.store import Fit, open_fit, open_stack
@@ -276,78 +276,23 @@ def render_bands(fit: Fit, lights: Lights, camera: Camera) -> Iterator[Band]:
     StoreError
         If a map is damaged.
     """
-    spec = parse_model(fit.attributes["model"])
     height, width = fit.shape
-    light_rgb = np.asarray(fit.attributes["light_rgb"], dtype=np.float64)
-    channels = len(light_rgb)
-    names = ["normal", "diffuse", *spec.shape_names]
-    names += ["specular"] if spec.lobes else []
-    names += ["ambient"] if spec.ambient else []
-    # The paper's procedure, taken literally, gives each pixel a view of its own in the plane of its arm.
-    tilted = "view_tilt" in fit.names
-    names += ["view_tilt"] if tilted else []
-    arm_azimuth = np.radians(fit.attributes["sample"]["arm_azimuth_deg"]) if tilted else 0.0
+    channels = len(fit.attributes["light_rgb"])
+    spec = parse_model(fit.attributes["model"])
     step = _band_rows(
         width, 8 + 2 * channels + spec.lobes + len(spec.shape_names) + 3 * channels * len(lights)
     )
-    near = lights.near or camera.distance_mm is not None
     for top in range(0, height, step):
         rows = slice(top, min(top + step, height))
-        maps = fit.read(rows, slice(0, width), names)
-        pixels = (rows.stop - rows.start) * width
-        flat = {name: np.ascontiguousarray(values.reshape(pixels, -1)) for name, values in maps.items()}
-        normal, diffuse = flat["normal"], flat["diffuse"]
-        specular = flat.get("specular", np.empty((pixels, 0), np.float32))
-        shape = np.concatenate(
-            [np.empty((pixels, 0), np.float32), *(flat[name] for name in spec.shape_names)], axis=1
-        )
-        missing = ~np.isfinite(normal).all(axis=1)
-        matte = ~missing & ~(np.isfinite(specular).all(axis=1) & np.isfinite(shape).all(axis=1))
-        specular[matte], shape[matte] = 0.0, 1.0
-        position = _position(rows, fit.shape, camera) if near else None
-        if tilted:
-            flat["view_tilt"][matte] = 0.0
-            normal = turn_about_z(normal, -arm_azimuth).astype(np.float32)
-            if position is not None:
-                position = turn_about_z(np.pad(position, ((0, 0), (0, 1))), -arm_azimuth)[:, :2].astype(
-                    np.float32
-                )
-        radiance = _core.render(
-            spec.name,
-            normal,
-            diffuse,
-            specular,
-            shape,
-            flat.get("ambient"),
-            view_tilt=flat["view_tilt"][:, 0] if tilted else None,
-            light_direction=turn_about_z(lights.direction, -arm_azimuth),
-            light_position_mm=turn_about_z(lights.position_mm, -arm_azimuth),
-            light_intensity=np.ascontiguousarray(np.broadcast_to(lights.intensity, (len(lights), channels))),
-            view_direction=camera.view_direction,
-            camera_distance_mm=camera.distance_mm,
-            position_mm=position,
-            light_rgb=light_rgb,
-            index=fit.attributes["index_of_refraction"],
-            fresnel=fit.attributes["fresnel"],
-        )
+        pixels = read_pixels(fit, rows, slice(0, width))
         yield Band(
             rows=rows,
-            radiance=radiance.reshape(len(lights), rows.stop - rows.start, width, channels),
-            missing_pixels=int(missing.sum()),
-            matte_pixels=int(matte.sum()),
+            radiance=render_pixels(pixels, lights, camera).reshape(
+                -1, rows.stop - rows.start, width, channels
+            ),
+            missing_pixels=int(pixels.missing.sum()),
+            matte_pixels=int(pixels.matte.sum()),
         )
-
-
-def _position(rows: slice, shape: tuple[int, int], camera: Camera) -> NDArray[np.float32]:
-    if camera.mm_per_px is None:
-        raise OptionError(
-            Problem(
-                where="render",
-                what="a light or the camera is near, and the stack does not say how large a pixel is",
-                do="State mm_per_px under [camera] in the photographs' TOML file and stack them again",
-            )
-        )
-    return pixel_position_mm(rows, slice(0, shape[1]), *shape, camera.mm_per_px)
 
 
 def _band_rows(width: int, floats_per_pixel: int) -> int:

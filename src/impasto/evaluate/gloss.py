@@ -17,12 +17,12 @@ from scipy.interpolate import RegularGridInterpolator
 from impasto.band_writers import BandWriter
 from impasto.errors import OptionError, Problem, raise_problems
 from impasto.evaluate.glossmeter import GLOSSMETERS, Glossmeter, quadrature
-from impasto.evaluate.pixels import Pixels, read_pixels
 from impasto.evaluate.regions import Sample, read_regions, sample_regions
 from impasto.geometry import Array, Camera, Lights
 from impasto.map_pictures import draw_values
 from impasto.models import ModelSpec, basis, parse_model
 from impasto.output import prepare_folder
+from impasto.pixels import Pixels, read_pixels
 from impasto.progress import progress
 from impasto.store import Fit, open_fit, open_stack
 
@@ -192,9 +192,13 @@ def region_gloss(pixels: Pixels, meter: Glossmeter) -> float:
     # Neighbouring rays meet pixels of all tilts: the fifth coordinate draws the pixel.
     pixel = pixels.select((points[:, 4] * len(pixels)).astype(np.intp))
     normal = pixel.normal @ _resting(pixels.normal.mean(axis=0))
-    diffuse, specular = pixel.basis(normal, light, view)
+    diffuse, specular = basis(pixels.model, normal, light, view, pixel.shape, **_optics(pixels.attributes))
     radiance = pixel.albedo * diffuse + np.sum(pixel.specular * specular, axis=1)
     return float(meter.gloss(np.mean(weight * radiance)))
+
+
+def _optics(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    return {"index": attributes["index_of_refraction"], "fresnel": attributes["fresnel"]}
 
 
 def _resting(normal: Array) -> Array:
@@ -230,8 +234,7 @@ class PixelGloss:
                 light,
                 view,
                 np.tile(values, (len(light), 1)),
-                index=attributes["index_of_refraction"],
-                fresnel=attributes["fresnel"],
+                **_optics(attributes),
             )
             table.append(meter.gloss(weight @ np.column_stack([diffuse, specular]) / len(light)))
         grid = np.reshape(table, (*(len(axis) for axis in axes), -1))
@@ -242,7 +245,7 @@ class PixelGloss:
             self._bounds = np.log([(axis[0], axis[-1]) for axis in axes]).T
 
     def __call__(self, pixels: Pixels) -> Array:
-        """Return gloss units, ndarray of shape (P,)."""
+        """Return gloss units, ndarray of shape (P,); NaN where the highlight is not known."""
         if self._constant is None:
             inside = np.clip(np.log(pixels.shape), *self._bounds)
             unit = np.exp(self._table(inside))
@@ -269,12 +272,13 @@ def _region(name: str, sample: Sample, tables: Sequence[PixelGloss]) -> RegionGl
 def _pixel(fit: Fit, column: int, row: int, tables: Sequence[PixelGloss]) -> RegionGloss:
     """Return the readings of one pixel as a flat sample."""
     pixels = read_pixels(fit, slice(row, row + 1), slice(column, column + 1))
-    values = [float(table(pixels)[0]) if len(pixels) else math.nan for table in tables]
+    values = [float(table(pixels)[0]) for table in tables]
     readings = [
         Reading(meter.angle_deg, *[value] * 4) for meter, value in zip(GLOSSMETERS, values, strict=True)
     ]
     name = f"pixel {column},{row}"
-    return RegionGloss(name, len(pixels), 1 - len(pixels), tuple(readings), values[1] - values[0])
+    known = int(pixels.whole[0])
+    return RegionGloss(name, known, 1 - known, tuple(readings), values[1] - values[0])
 
 
 def _write_maps(
@@ -296,8 +300,7 @@ def _write_maps(
             rows = slice(top, min(top + _BAND_ROWS, height))
             pixels = read_pixels(fit, rows, slice(0, width))
             for writer, table, preview in zip(writers, tables, previews, strict=True):
-                band = np.full((rows.stop - top, width, 1), np.nan, np.float32)
-                band[pixels.row - top, pixels.column, 0] = table(pixels)
+                band = table(pixels).reshape(-1, width, 1).astype(np.float32)
                 writer.write(band)
                 shown = slice(-top % step, None, step)
                 preview[-(-top // step) :][: len(band[shown])] = band[shown, ::step, 0]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from impasto.capture.photographs import read_photograph
 from impasto.errors import CaptureError, OptionError, Problem
-from impasto.evaluate.pixels import Pixels, join_pixels, read_pixels
+from impasto.pixels import Pixels, join_pixels, read_pixels
 from impasto.progress import progress
 from impasto.store import Fit
 
@@ -138,6 +138,7 @@ def sample_regions(fit: Fit, regions: Regions | None, size: int, *, show: bool |
         for top in range(0, height, _BAND_ROWS):
             rows = slice(top, min(top + _BAND_ROWS, height))
             pixels = read_pixels(fit, rows, slice(0, width))
+            pixels = pixels.select(pixels.whole)
             label = regions.label[rows] if regions else np.zeros((rows.stop - top, width), np.uint16)
             of_pixel = label[pixels.row - top, pixels.column]
             key = np.random.default_rng(top).random(len(pixels))

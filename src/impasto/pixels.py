@@ -1,0 +1,217 @@
+"""The fitted parameters of some pixels, and their radiance under lights."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from impasto import _core
+from impasto.errors import OptionError, Problem
+from impasto.geometry import Array, Camera, Lights, position_mm, turn_about_z
+from impasto.models import ModelSpec, parse_model
+from impasto.store import Fit
+
+Map = NDArray[np.float32]
+
+# Rec. 709: luminance of linear sRGB.
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+_PER_PIXEL = ("row", "column", "normal", "diffuse", "specular", "shape", "ambient", "view_tilt")
+
+
+@dataclass(frozen=True)
+class Pixels:
+    """Pixels of a fit, side by side as the core takes them.
+
+    Parameters
+    ----------
+    attributes : mapping
+        Of the fit.
+    size : tuple of int
+        Height and width of the painting in pixels.
+    row, column : ndarray of shape (P,), int
+    normal : ndarray of shape (P, 3)
+    diffuse : ndarray of shape (P, C)
+    specular : ndarray of shape (P, lobes)
+    shape : ndarray of shape (P, S)
+        Shape parameters in the model's order.
+    ambient : ndarray of shape (P, C) or None
+        For models with the term.
+    view_tilt : ndarray of shape (P,) or None
+        The view of each pixel, in the plane of the arm, as the paper's procedure has it in its literal form.
+    """
+
+    attributes: Mapping[str, Any]
+    size: tuple[int, int]
+    row: NDArray[np.intp]
+    column: NDArray[np.intp]
+    normal: Map
+    diffuse: Map
+    specular: Map
+    shape: Map
+    ambient: Map | None
+    view_tilt: Map | None
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    @property
+    def model(self) -> ModelSpec:
+        """The model that was fitted."""
+        return parse_model(self.attributes["model"])
+
+    @property
+    def light_rgb(self) -> Array:
+        """Colour of the specular term, shape (C,)."""
+        return np.asarray(self.attributes["light_rgb"], np.float64)
+
+    @property
+    def albedo(self) -> Array:
+        """Diffuse magnitude in luminance under white light, shape (P,)."""
+        return luminance(self.diffuse / self.light_rgb)
+
+    @property
+    def missing(self) -> NDArray[np.bool_]:
+        """Which pixels have no fit."""
+        return np.logical_not(np.isfinite(self.normal).all(axis=1))
+
+    @property
+    def matte(self) -> NDArray[np.bool_]:
+        """Which pixels have a fit, but a highlight that the photographs do not tell."""
+        seen = np.isfinite(self.specular).all(axis=1) & np.isfinite(self.shape).all(axis=1)
+        return ~self.missing & ~seen
+
+    @property
+    def whole(self) -> NDArray[np.bool_]:
+        """Which pixels have all their parameters."""
+        return ~self.missing & ~self.matte
+
+    def select(self, index: ArrayLike) -> Pixels:
+        """Return the pixels at `index` (integers or a boolean mask), in that order."""
+        index = np.asarray(index)
+        columns = {name: getattr(self, name) for name in _PER_PIXEL}
+        chosen: dict[str, Any] = {
+            name: None if values is None else values[index] for name, values in columns.items()
+        }
+        return replace(self, **chosen)
+
+
+def join_pixels(parts: Sequence[Pixels]) -> Pixels:
+    """Return pixels of one fit, at least one part, as a whole."""
+    columns = {name: [getattr(part, name) for part in parts] for name in _PER_PIXEL}
+    joined: dict[str, Any] = {
+        name: None if values[0] is None else np.concatenate(values) for name, values in columns.items()
+    }
+    return replace(parts[0], **joined)
+
+
+def luminance(values: NDArray[np.floating]) -> Array:
+    """Return the luminance of colours (..., C): by Rec. 709 for three channels, else their mean."""
+    channels = values.shape[-1]
+    weights = _LUMINANCE if channels == 3 else np.full(channels, 1 / channels)
+    result: Array = np.asarray(values, np.float64) @ weights
+    return result
+
+
+def read_pixels(fit: Fit, rows: slice, columns: slice) -> Pixels:
+    """Return the pixels of a tile, row by row.
+
+    Raises
+    ------
+    StoreError
+        If a map is damaged or lost.
+    """
+    spec = parse_model(fit.attributes["model"])
+    names = ["normal", "diffuse", *spec.shape_names]
+    names += ["specular"] if spec.lobes else []
+    names += ["ambient"] if spec.ambient else []
+    names += ["view_tilt"] if "view_tilt" in fit.names else []
+    maps = fit.read(rows, columns, names)
+    height, width = maps["normal"].shape[:2]
+    count = height * width
+    flat = {name: np.ascontiguousarray(values.reshape(count, -1)) for name, values in maps.items()}
+    row, column = np.divmod(np.arange(count), width)
+    none = np.empty((count, 0), np.float32)
+    return Pixels(
+        attributes=fit.attributes,
+        size=fit.shape,
+        row=row + rows.start,
+        column=column + columns.start,
+        normal=flat["normal"],
+        diffuse=flat["diffuse"],
+        specular=flat.get("specular", none),
+        shape=np.concatenate([none, *(flat[name] for name in spec.shape_names)], axis=1),
+        ambient=flat.get("ambient"),
+        view_tilt=flat["view_tilt"][:, 0] if "view_tilt" in flat else None,
+    )
+
+
+def render_pixels(pixels: Pixels, lights: Lights, camera: Camera) -> NDArray[np.float32]:
+    """Return the relative radiance of pixels under lights.
+
+    A pixel whose highlight the photographs do not tell is rendered without one.
+
+    Parameters
+    ----------
+    pixels : Pixels
+    lights : Lights
+    camera : Camera
+        The camera of the photographs.
+
+    Returns
+    -------
+    ndarray of shape (L, P, C), float32
+        NaN where there is no fit.
+
+    Raises
+    ------
+    OptionError
+        If a light or the camera is near, and the size of a pixel is not known.
+    """
+    matte = pixels.matte[:, None]
+    normal, position = pixels.normal, None
+    view_tilt, arm_azimuth = pixels.view_tilt, 0.0
+    if lights.near or camera.distance_mm is not None:
+        position = _position(pixels, camera)
+    if view_tilt is not None:
+        arm_azimuth = np.radians(pixels.attributes["sample"]["arm_azimuth_deg"])
+        view_tilt = np.where(matte[:, 0], np.float32(0.0), view_tilt)
+        normal = turn_about_z(normal, -arm_azimuth).astype(np.float32)
+        if position is not None:
+            turned = turn_about_z(np.pad(position, ((0, 0), (0, 1))), -arm_azimuth)
+            position = turned[:, :2].astype(np.float32)
+    channels = pixels.diffuse.shape[1]
+    return _core.render(
+        pixels.model.name,
+        normal,
+        pixels.diffuse,
+        np.where(matte, np.float32(0.0), pixels.specular),
+        np.where(matte, np.float32(1.0), pixels.shape),
+        pixels.ambient,
+        view_tilt=view_tilt,
+        light_direction=turn_about_z(lights.direction, -arm_azimuth),
+        light_position_mm=turn_about_z(lights.position_mm, -arm_azimuth),
+        light_intensity=np.ascontiguousarray(np.broadcast_to(lights.intensity, (len(lights), channels))),
+        view_direction=camera.view_direction,
+        camera_distance_mm=camera.distance_mm,
+        position_mm=position,
+        light_rgb=pixels.light_rgb,
+        index=pixels.attributes["index_of_refraction"],
+        fresnel=pixels.attributes["fresnel"],
+    )
+
+
+def _position(pixels: Pixels, camera: Camera) -> NDArray[np.float32]:
+    if camera.mm_per_px is None:
+        raise OptionError(
+            Problem(
+                where="render",
+                what="a light or the camera is near, and the stack does not say how large a pixel is",
+                do="State mm_per_px under [camera] in the photographs' TOML file and stack them again",
+            )
+        )
+    return position_mm(pixels.row, pixels.column, *pixels.size, camera.mm_per_px)
