@@ -4,20 +4,20 @@
 //! are therefore an arrow: a block per channel, bordered by the lobes. Eliminating the blocks leaves a system of the size
 //! of the number of lobes.
 
-use crate::lanes::{Lane, LaneMask, outlined};
+use crate::lanes::{Isa, Lane, LaneMask, outlined};
 use crate::minimise::solve_symmetric;
 use crate::models::MAX_LOBES;
 use crate::number::{Mask, Number, Real, array};
 
 /// A vector shaped like the magnitudes: (diffuse, ambient) per channel, then one number per lobe.
 #[derive(Clone, Copy)]
-pub struct Magnitudes<const FMA: bool, const C: usize> {
-    pub diffuse: [Lane<FMA>; C],
-    pub ambient: [Lane<FMA>; C],
-    pub specular: [Lane<FMA>; MAX_LOBES],
+pub struct Magnitudes<const ISA: Isa, const C: usize> {
+    pub diffuse: [Lane<ISA>; C],
+    pub ambient: [Lane<ISA>; C],
+    pub specular: [Lane<ISA>; MAX_LOBES],
 }
 
-impl<const FMA: bool, const C: usize> Magnitudes<FMA, C> {
+impl<const ISA: Isa, const C: usize> Magnitudes<ISA, C> {
     #[inline(always)]
     pub fn zero() -> Self {
         let zero = Lane::splat(0.0);
@@ -25,7 +25,7 @@ impl<const FMA: bool, const C: usize> Magnitudes<FMA, C> {
     }
 
     #[inline(always)]
-    pub fn dot(&self, other: &Self) -> Lane<FMA> {
+    pub fn dot(&self, other: &Self) -> Lane<ISA> {
         let mut sum = Lane::splat(0.0);
         for k in 0..C {
             sum = self.diffuse[k].mul_add(other.diffuse[k], sum);
@@ -59,26 +59,26 @@ impl<const C: usize> Free<C> {
 
 /// Weighted sums of products of the basis functions over the lights, for one channel.
 #[derive(Clone, Copy)]
-struct ChannelSums<const FMA: bool> {
-    diffuse_diffuse: Lane<FMA>,
-    diffuse_one: Lane<FMA>,
-    one_one: Lane<FMA>,
-    diffuse_specular: [Lane<FMA>; MAX_LOBES],
-    one_specular: [Lane<FMA>; MAX_LOBES],
+struct ChannelSums<const ISA: Isa> {
+    diffuse_diffuse: Lane<ISA>,
+    diffuse_one: Lane<ISA>,
+    one_one: Lane<ISA>,
+    diffuse_specular: [Lane<ISA>; MAX_LOBES],
+    one_specular: [Lane<ISA>; MAX_LOBES],
 }
 
 /// The normal equations of the magnitudes: a matrix and a right-hand side.
 #[derive(Clone, Copy)]
-pub struct Arrow<const FMA: bool, const C: usize> {
-    channel: [ChannelSums<FMA>; C],
-    specular_specular: [[Lane<FMA>; MAX_LOBES]; MAX_LOBES],
+pub struct Arrow<const ISA: Isa, const C: usize> {
+    channel: [ChannelSums<ISA>; C],
+    specular_specular: [[Lane<ISA>; MAX_LOBES]; MAX_LOBES],
     /// Whether the ambient magnitudes are fitted.
     ambient: bool,
     /// Projections of the data on the basis functions.
-    pub right: Magnitudes<FMA, C>,
+    pub right: Magnitudes<ISA, C>,
 }
 
-impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
+impl<const ISA: Isa, const C: usize> Arrow<ISA, C> {
     #[inline(always)]
     pub fn new(ambient: bool) -> Self {
         let zero = Lane::splat(0.0);
@@ -102,11 +102,11 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
     pub fn add(
         &mut self,
         lobes: usize,
-        diffuse: Lane<FMA>,
-        specular: &[Lane<FMA>; MAX_LOBES],
-        radiance: &[Lane<FMA>; C],
-        weight: &[Lane<FMA>; C],
-        colour: &[Lane<FMA>; C],
+        diffuse: Lane<ISA>,
+        specular: &[Lane<ISA>; MAX_LOBES],
+        radiance: &[Lane<ISA>; C],
+        weight: &[Lane<ISA>; C],
+        colour: &[Lane<ISA>; C],
     ) {
         // Σ_k s_k² w and Σ_k s_k w y, so that the lobes' own sums are taken once and not once per channel.
         let mut lobe_weight = Lane::splat(0.0);
@@ -145,13 +145,13 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
 
     /// Adds information from elsewhere: that a lobe's magnitude is 0 with this weight.
     #[inline(always)]
-    pub fn add_ridge(&mut self, lobe: usize, weight: Lane<FMA>) {
+    pub fn add_ridge(&mut self, lobe: usize, weight: Lane<ISA>) {
         self.specular_specular[lobe][lobe] = self.specular_specular[lobe][lobe] + weight;
     }
 
     /// Eliminates the channels' blocks.
     #[inline(always)]
-    fn factor(&self, lobes: usize, free: &Free<C>) -> Factored<FMA, C> {
+    fn factor(&self, lobes: usize, free: &Free<C>) -> Factored<ISA, C> {
         let zero = Lane::splat(0.0);
         let one = Lane::splat(1.0);
         let mut inverse = [BlockInverse { diffuse: zero, cross: zero, ambient: zero }; C];
@@ -204,15 +204,15 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
 
     /// The magnitudes that fit best, none of them negative, and the factored equations of those that are not held at 0.
     #[inline(always)]
-    pub fn magnitudes(&self, lobes: usize) -> (Magnitudes<FMA, C>, Factored<FMA, C>) {
-        outlined::<FMA, _>(
+    pub fn magnitudes(&self, lobes: usize) -> (Magnitudes<ISA, C>, Factored<ISA, C>) {
+        outlined::<ISA, _>(
             #[inline(always)]
             || self.nonnegative(lobes),
         )
     }
 
     #[inline(always)]
-    fn nonnegative(&self, lobes: usize) -> (Magnitudes<FMA, C>, Factored<FMA, C>) {
+    fn nonnegative(&self, lobes: usize) -> (Magnitudes<ISA, C>, Factored<ISA, C>) {
         let zero = Lane::splat(0.0);
         let mut free = Free::new(lobes, self.ambient);
         // Holding every negative magnitude at 0 at once is not quite the constrained optimum where two of them are negative
@@ -254,15 +254,15 @@ impl<const FMA: bool, const C: usize> Arrow<FMA, C> {
 
 /// The inverse of a channel's block of (diffuse, ambient).
 #[derive(Clone, Copy)]
-struct BlockInverse<const FMA: bool> {
-    diffuse: Lane<FMA>,
-    cross: Lane<FMA>,
-    ambient: Lane<FMA>,
+struct BlockInverse<const ISA: Isa> {
+    diffuse: Lane<ISA>,
+    cross: Lane<ISA>,
+    ambient: Lane<ISA>,
 }
 
-impl<const FMA: bool> BlockInverse<FMA> {
+impl<const ISA: Isa> BlockInverse<ISA> {
     #[inline(always)]
-    fn apply(&self, with_ambient: bool, diffuse: Lane<FMA>, ambient: Lane<FMA>) -> (Lane<FMA>, Lane<FMA>) {
+    fn apply(&self, with_ambient: bool, diffuse: Lane<ISA>, ambient: Lane<ISA>) -> (Lane<ISA>, Lane<ISA>) {
         if with_ambient {
             (self.diffuse.mul_add(diffuse, self.cross * ambient), self.cross.mul_add(diffuse, self.ambient * ambient))
         } else {
@@ -273,25 +273,25 @@ impl<const FMA: bool> BlockInverse<FMA> {
 
 /// The normal equations, ready to be solved for any right-hand side.
 #[derive(Clone, Copy)]
-pub struct Factored<const FMA: bool, const C: usize> {
-    channel: [ChannelSums<FMA>; C],
+pub struct Factored<const ISA: Isa, const C: usize> {
+    channel: [ChannelSums<ISA>; C],
     lobes: usize,
     pub ambient: bool,
-    inverse: [BlockInverse<FMA>; C],
-    schur: [[Lane<FMA>; MAX_LOBES]; MAX_LOBES],
+    inverse: [BlockInverse<ISA>; C],
+    schur: [[Lane<ISA>; MAX_LOBES]; MAX_LOBES],
 }
 
-impl<const FMA: bool, const C: usize> Factored<FMA, C> {
+impl<const ISA: Isa, const C: usize> Factored<ISA, C> {
     #[inline(always)]
-    pub fn solve(&self, right: &Magnitudes<FMA, C>) -> Magnitudes<FMA, C> {
-        outlined::<FMA, _>(
+    pub fn solve(&self, right: &Magnitudes<ISA, C>) -> Magnitudes<ISA, C> {
+        outlined::<ISA, _>(
             #[inline(always)]
             || self.solve_inline(right),
         )
     }
 
     #[inline(always)]
-    fn solve_inline(&self, right: &Magnitudes<FMA, C>) -> Magnitudes<FMA, C> {
+    fn solve_inline(&self, right: &Magnitudes<ISA, C>) -> Magnitudes<ISA, C> {
         let mut result = *right;
         for k in 0..C {
             (result.diffuse[k], result.ambient[k]) =

@@ -1,10 +1,10 @@
 //! From a model's name, the number of channels and the processor's instructions to the code compiled for them.
 //!
-//! The fit and the renderer are compiled twice, for any x86-64 and for one with AVX2 and FMA; which one runs is decided
-//! when it is called. The inner functions are inlined whole, so that they inherit the instruction set from here.
+//! The fit and the renderer are compiled for several sets of instructions; which of them runs is decided when it is called.
+//! The inner functions are inlined whole, so that they inherit the instructions from here.
 
 use crate::joint::{JointFit, Options};
-use crate::lanes::LANES;
+use crate::lanes::{FUSED, Isa, LANES, PLAIN, WIDE, outlined};
 use crate::models::{Model, Optics, ShapeParameter};
 use crate::observations::Stack;
 use crate::paper::{PaperFit, Sample};
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use std::sync::LazyLock;
 
 /// Pixels that one thread takes at a time: enough to hide the start of a task, few enough to share a tile evenly.
-const BLOCK: usize = 64 * LANES;
+const BLOCK: usize = 32 * LANES;
 
 /// Channels that the fit is compiled for: stacks of fewer leave the rest without weight.
 pub const MAX_CHANNELS: usize = 3;
@@ -37,16 +37,65 @@ pub struct Fitted {
     pub status: Vec<u8>,
 }
 
-/// Whether the fast version runs: the processor has its instructions, and IMPASTO_PLAIN is not set in the environment.
-pub fn fast_instructions() -> bool {
-    static FAST: LazyLock<bool> = LazyLock::new(|| {
-        #[cfg(target_arch = "x86_64")]
-        let has = std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma");
-        #[cfg(not(target_arch = "x86_64"))]
-        let has = cfg!(target_arch = "aarch64");
-        has && std::env::var_os("IMPASTO_PLAIN").is_none()
+/// The instructions that the fit and the renderer run with: the best that the processor has, unless the environment
+/// names others that it has too (IMPASTO_INSTRUCTIONS).
+pub fn instructions() -> Isa {
+    static BEST: LazyLock<Isa> = LazyLock::new(|| {
+        let asked = std::env::var("IMPASTO_INSTRUCTIONS").unwrap_or_default();
+        let known = |isa: &&Isa| asked == instruction_name(**isa);
+        *AVAILABLE.iter().find(known).unwrap_or(AVAILABLE.last().expect("at least the plain ones"))
     });
-    *FAST
+    *BEST
+}
+
+/// What this processor has, the best last.
+static AVAILABLE: LazyLock<Vec<Isa>> = LazyLock::new(|| {
+    #[cfg(target_arch = "x86_64")]
+    let (fused, wide) = {
+        use std::arch::is_x86_feature_detected as has;
+        let fused = has!("avx2") && has!("fma");
+        let wide = has!("avx512f") && has!("avx512vl") && has!("avx512dq") && has!("avx512bw");
+        (fused, fused && wide)
+    };
+    #[cfg(not(target_arch = "x86_64"))]
+    let (fused, wide) = (cfg!(target_arch = "aarch64"), false);
+    let found = [(PLAIN, true), (FUSED, fused), (WIDE, wide)];
+    found.into_iter().filter_map(|(isa, has)| has.then_some(isa)).collect()
+});
+
+/// The names of the instructions that this processor has, the best last.
+pub fn available_instructions() -> Vec<&'static str> {
+    AVAILABLE.iter().map(|isa| instruction_name(*isa)).collect()
+}
+
+pub fn instruction_name(isa: Isa) -> &'static str {
+    match isa {
+        WIDE => "avx512",
+        FUSED if cfg!(target_arch = "x86_64") => "avx2",
+        FUSED => "fused",
+        _ => "plain",
+    }
+}
+
+/// Evaluates an expression in which `$isa` is the constant for the instructions that the processor has.
+macro_rules! with_instructions {
+    ($isa:ident => $expression:expr) => {
+        match instructions() {
+            #[cfg(target_arch = "x86_64")]
+            WIDE => {
+                const $isa: Isa = WIDE;
+                $expression
+            }
+            FUSED => {
+                const $isa: Isa = FUSED;
+                $expression
+            }
+            _ => {
+                const $isa: Isa = PLAIN;
+                $expression
+            }
+        }
+    };
 }
 
 #[inline(always)]
@@ -57,61 +106,38 @@ fn fit_block<F: FitGroup>(fit: &mut F, block: usize, rows: &mut [f32], status: &
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn fit_block_fast<F: FitGroup>(fit: &mut F, block: usize, rows: &mut [f32], status: &mut [u8]) {
-    fit_block(fit, block, rows, status);
-}
-
-/// Fits a tile with all threads: `fast` makes the fit for AVX2 and FMA, `plain` the one for any processor.
-fn fit_tile<Fast: FitGroup, Plain: FitGroup>(
-    pixels: usize,
-    fast: impl Fn() -> Fast + Sync + Send,
-    plain: impl Fn() -> Plain + Sync + Send,
-    layout: Layout,
-) -> Fitted {
+/// Fits a tile with all threads, each with a fit that `make` makes for `ISA`.
+fn fit_tile<const ISA: Isa, F: FitGroup>(pixels: usize, make: impl Fn() -> F + Sync + Send, layout: Layout) -> Fitted {
     let width = layout.width();
     let mut rows = vec![0.0; pixels * width];
     let mut status = vec![0; pixels];
     let blocks = rows.par_chunks_mut(BLOCK * width).zip(status.par_chunks_mut(BLOCK)).enumerate();
-    if fast_instructions() {
-        blocks.for_each_init(fast, |fit, (block, (rows, status))| {
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: the processor has AVX2 and FMA, as `fast_instructions` has just said.
-            unsafe {
-                fit_block_fast(fit, block, rows, status);
-            }
-            #[cfg(not(target_arch = "x86_64"))]
-            fit_block(fit, block, rows, status);
-        });
-    } else {
-        blocks.for_each_init(plain, |fit, (block, (rows, status))| fit_block(fit, block, rows, status));
-    }
+    blocks.for_each_init(make, |fit, (block, (rows, status))| {
+        outlined::<ISA, _>(
+            #[inline(always)]
+            || fit_block(fit, block, rows, status),
+        )
+    });
     Fitted { layout, rows, status }
 }
 
 fn fit_joint<M: Model, const P: usize>(stack: &Stack, colour: &[f64], options: Options) -> Fitted {
-    fit_tile(
-        stack.pixels,
-        || JointFit::<M, true, MAX_CHANNELS, P>::new(stack, colour, options),
-        || JointFit::<M, false, MAX_CHANNELS, P>::new(stack, colour, options),
-        JointFit::<M, true, MAX_CHANNELS, P>::layout(stack.channels, options.ambient),
-    )
-}
-
-fn fit_paper<M: Model>(stack: &Stack, colour: &[f64], sample: Sample, options: Options) -> Option<Fitted> {
-    PaperFit::<M, true, MAX_CHANNELS>::APPLIES.then(|| {
-        fit_tile(
-            stack.pixels,
-            || PaperFit::<M, true, MAX_CHANNELS>::new(stack, colour, sample, options),
-            || PaperFit::<M, false, MAX_CHANNELS>::new(stack, colour, sample, options),
-            Layout::paper(stack.channels),
-        )
+    with_instructions!(ISA => {
+        let make = || JointFit::<M, ISA, MAX_CHANNELS, P>::new(stack, colour, options);
+        let layout = JointFit::<M, ISA, MAX_CHANNELS, P>::layout(stack.channels, options.ambient);
+        fit_tile::<ISA, _>(stack.pixels, make, layout)
     })
 }
 
+fn fit_paper<M: Model>(stack: &Stack, colour: &[f64], sample: Sample, options: Options) -> Option<Fitted> {
+    with_instructions!(ISA => PaperFit::<M, ISA, MAX_CHANNELS>::APPLIES.then(|| {
+        let make = || PaperFit::<M, ISA, MAX_CHANNELS>::new(stack, colour, sample, options);
+        fit_tile::<ISA, _>(stack.pixels, make, Layout::paper(stack.channels))
+    }))
+}
+
 #[inline(always)]
-fn render_block<M: Model, const FMA: bool>(
+fn render_block<M: Model, const ISA: Isa>(
     parameters: &Parameters,
     view: &View,
     optics: &Optics,
@@ -119,36 +145,18 @@ fn render_block<M: Model, const FMA: bool>(
     radiance: &mut [f32],
 ) {
     for (group, radiance) in radiance.chunks_mut(LANES * view.intensity.len()).enumerate() {
-        render_group::<M, FMA>(parameters, view, optics, block * BLOCK + group * LANES, radiance);
+        render_group::<M, ISA>(parameters, view, optics, block * BLOCK + group * LANES, radiance);
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn render_block_fast<M: Model>(
-    parameters: &Parameters,
-    view: &View,
-    optics: &Optics,
-    block: usize,
-    radiance: &mut [f32],
-) {
-    render_block::<M, true>(parameters, view, optics, block, radiance);
-}
-
 fn render_light<M: Model>(parameters: &Parameters, view: &View, optics: &Optics, radiance: &mut [f32]) {
-    let fast = fast_instructions();
-    radiance.par_chunks_mut(BLOCK * view.intensity.len()).enumerate().for_each(|(block, radiance)| {
-        #[cfg(target_arch = "x86_64")]
-        if fast {
-            // SAFETY: the processor has AVX2 and FMA.
-            return unsafe { render_block_fast::<M>(parameters, view, optics, block, radiance) };
-        }
-        if fast {
-            render_block::<M, true>(parameters, view, optics, block, radiance);
-        } else {
-            render_block::<M, false>(parameters, view, optics, block, radiance);
-        }
-    });
+    let blocks = radiance.par_chunks_mut(BLOCK * view.intensity.len()).enumerate();
+    with_instructions!(ISA => blocks.for_each(|(block, radiance)| {
+        outlined::<ISA, _>(
+            #[inline(always)]
+            || render_block::<M, ISA>(parameters, view, optics, block, radiance),
+        )
+    }));
 }
 
 macro_rules! dispatch {

@@ -1,5 +1,6 @@
 //! Directions of light and view at a pixel (paper, Fig. 2; docs/notation.md).
 
+use crate::fresnel::fresnel;
 use crate::number::{Number, Real, array};
 
 /// a · b, where b has no derivatives.
@@ -33,15 +34,28 @@ pub struct Illumination<R> {
     pub view: [R; 3],
     /// Half vector h = (l + v) / |l + v|.
     pub half: [R; 3],
-    /// l · h = v · h, the cosine of the facet's angle of incidence.
-    pub light_half: R,
+    /// 1 / (l · h) = 1 / (v · h), of the cosine of the facet's angle of incidence.
+    pub per_light_half: R,
+    /// F at that angle: the same in every step of a fit.
+    pub facet_reflectance: R,
 }
 
 impl<R: Real> Illumination<R> {
+    /// `index` is that of refraction.
     #[inline(always)]
-    pub fn new(light: [R; 3], view: [R; 3]) -> Self {
-        let half = normalise(array!(|i| light[i] + view[i]));
-        Illumination { light, view, half, light_half: dot(half, light) }
+    pub fn new(light: [R; 3], view: [R; 3], index: f64) -> Self {
+        let sum: [R; 3] = array!(|i| light[i] + view[i]);
+        let squared = dot(sum, sum);
+        let inverse = R::splat(1.0) / squared.sqrt();
+        // l · h = |l + v| / 2.
+        let light_half = squared * inverse * R::splat(0.5);
+        Illumination {
+            light,
+            view,
+            half: array!(|i| sum[i] * inverse),
+            per_light_half: inverse + inverse,
+            facet_reflectance: fresnel(light_half, index),
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The joint fit: normal, shape and magnitudes of a pixel over all its lights at once.
 
-use crate::lanes::Lane;
+use crate::lanes::{Isa, Lane};
 use crate::minimise::{Objective, inverse, minimise};
 use crate::models::{MAX_LOBES, MAX_SHAPE, Model, Optics};
 use crate::number::{Mask, Number, Real, array};
@@ -22,19 +22,19 @@ pub struct Options {
 }
 
 /// The fit of groups of eight pixels, with its buffers.
-pub struct JointFit<'a, M, const FMA: bool, const C: usize, const P: usize> {
+pub struct JointFit<'a, M, const ISA: Isa, const C: usize, const P: usize> {
     stack: &'a Stack<'a>,
     options: Options,
-    colour: [Lane<FMA>; C],
-    group: Group<FMA, C>,
-    grey: Vec<Grey<FMA>>,
+    colour: [Lane<ISA>; C],
+    group: Group<ISA, C>,
+    grey: Vec<Grey<ISA>>,
     /// Share of each light's weight that its samples keep at the start of a robust fit.
-    kept: Vec<Lane<FMA>>,
-    scratch: Scratch<FMA, C, P>,
+    kept: Vec<Lane<ISA>>,
+    scratch: Scratch<ISA, C, P>,
     model: PhantomData<M>,
 }
 
-impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> JointFit<'a, M, FMA, C, P> {
+impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> JointFit<'a, M, ISA, C, P> {
     pub fn layout(channels: usize, ambient: bool) -> Layout {
         Layout::joint(channels, M::LOBES, P - 2, if ambient { channels } else { 0 })
     }
@@ -50,7 +50,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> JointFit<'a,
             stack,
             options,
             colour: array!(|k| Lane::splat(colour.get(k).copied().unwrap_or(0.0))),
-            group: Group::new(stack),
+            group: Group::new(stack, options.optics.index),
             grey: Vec::with_capacity(stack.lights.len()),
             kept: Vec::with_capacity(stack.lights.len()),
             scratch: Scratch::new(stack.lights.len()),
@@ -59,7 +59,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> JointFit<'a,
     }
 }
 
-impl<M: Model, const FMA: bool, const C: usize, const P: usize> FitGroup for JointFit<'_, M, FMA, C, P> {
+impl<M: Model, const ISA: Isa, const C: usize, const P: usize> FitGroup for JointFit<'_, M, ISA, C, P> {
     fn layout(&self) -> Layout {
         Self::layout(self.stack.channels, self.options.ambient)
     }
@@ -76,9 +76,9 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize> FitGroup for Joi
             doubt_shadows(&mut self.grey, illuminations, &mut self.kept);
         }
         let mut begin =
-            start::<M, FMA>(&candidates(&self.grey, illuminations), &self.grey, illuminations, &optics, ambient);
+            start::<M, ISA>(&candidates(&self.grey, illuminations), &self.grey, illuminations, &optics, ambient);
 
-        let mut problem = Separable::<M, FMA, C, P>::new(
+        let mut problem = Separable::<M, ISA, C, P>::new(
             &self.group,
             self.colour,
             optics,
@@ -101,10 +101,10 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize> FitGroup for Joi
         // found the grid of shapes may show a better lobe.
         let trapped = wanted & !solution.magnitudes.specular[0].positive();
         if M::LOBES > 0 && trapped.any() {
-            let again = start::<M, FMA>(&[outcome.point.normal], &self.grey, illuminations, &optics, ambient);
+            let again = start::<M, ISA>(&[outcome.point.normal], &self.grey, illuminations, &optics, ambient);
             let retried = minimise(&mut problem, &again, trapped, self.options.max_steps);
             let better = retried.cost.lt(solution.quadratic.cost) & trapped;
-            outcome.point = Separable::<M, FMA, C, P>::select(better, &retried.point, &outcome.point);
+            outcome.point = Separable::<M, ISA, C, P>::select(better, &retried.point, &outcome.point);
             outcome.converged = (outcome.converged & !better) | (retried.converged & better);
             solution = problem.solve(&outcome.point);
         }
@@ -135,7 +135,7 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize> FitGroup for Joi
                 row.fill(f32::NAN);
                 continue;
             }
-            write_row::<FMA, C, P>(
+            write_row::<ISA, C, P>(
                 Row::new(row),
                 [channels, M::LOBES, P - 2, ambients],
                 lane,
@@ -148,18 +148,18 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize> FitGroup for Joi
     }
 }
 
-struct Summary<const FMA: bool> {
-    chi2_reduced: Lane<FMA>,
+struct Summary<const ISA: Isa> {
+    chi2_reduced: Lane<ISA>,
     /// Root mean square over the usable samples, in relative radiance as measured.
-    residual_rms: Lane<FMA>,
+    residual_rms: Lane<ISA>,
 }
 
 #[inline(always)]
-fn summarise<M: Model, const FMA: bool, const C: usize, const P: usize>(
-    problem: &Separable<'_, M, FMA, C, P>,
-    solution: &Solution<FMA, C, P>,
-    irradiance: &[[Lane<FMA>; C]],
-) -> Summary<FMA> {
+fn summarise<M: Model, const ISA: Isa, const C: usize, const P: usize>(
+    problem: &Separable<'_, M, ISA, C, P>,
+    solution: &Solution<ISA, C, P>,
+    irradiance: &[[Lane<ISA>; C]],
+) -> Summary<ISA> {
     let (zero, one) = (Lane::splat(0.0), Lane::splat(1.0));
     let mut samples = zero;
     let mut chi2 = zero;
@@ -182,24 +182,24 @@ fn summarise<M: Model, const FMA: bool, const C: usize, const P: usize>(
 
 /// Standard deviations from the Fisher information at the solution. Where the residuals exceed the noise model they are
 /// raised by √χ²_reduced [Birge1932], for what the model does not describe is then the larger error.
-struct Deviations<const FMA: bool, const C: usize> {
+struct Deviations<const ISA: Isa, const C: usize> {
     /// Root mean square angle between the fitted and the true normal, radians.
-    normal: Lane<FMA>,
+    normal: Lane<ISA>,
     /// Relative, for the parameters are fitted in their logarithm.
-    shape_relative: [Lane<FMA>; MAX_SHAPE],
-    diffuse: [Lane<FMA>; C],
-    ambient: [Lane<FMA>; C],
-    specular: [Lane<FMA>; MAX_LOBES],
+    shape_relative: [Lane<ISA>; MAX_SHAPE],
+    diffuse: [Lane<ISA>; C],
+    ambient: [Lane<ISA>; C],
+    specular: [Lane<ISA>; MAX_LOBES],
 }
 
 #[inline(always)]
-fn deviation<const FMA: bool>(variance: Lane<FMA>, birge: Lane<FMA>) -> Lane<FMA> {
+fn deviation<const ISA: Isa>(variance: Lane<ISA>, birge: Lane<ISA>) -> Lane<ISA> {
     (variance * birge).max(Lane::splat(0.0)).sqrt()
 }
 
-impl<const FMA: bool, const C: usize> Deviations<FMA, C> {
+impl<const ISA: Isa, const C: usize> Deviations<ISA, C> {
     #[inline(always)]
-    fn new<const P: usize>(lobes: usize, solution: &Solution<FMA, C, P>, chi2_reduced: Lane<FMA>) -> Self {
+    fn new<const P: usize>(lobes: usize, solution: &Solution<ISA, C, P>, chi2_reduced: Lane<ISA>) -> Self {
         let zero = Lane::splat(0.0);
         let birge = chi2_reduced.max(Lane::splat(1.0));
         let mut hessian = solution.quadratic.hessian;
@@ -235,14 +235,14 @@ impl<const FMA: bool, const C: usize> Deviations<FMA, C> {
 }
 
 #[inline(always)]
-fn write_row<const FMA: bool, const C: usize, const P: usize>(
+fn write_row<const ISA: Isa, const C: usize, const P: usize>(
     mut row: Row,
     [channels, lobes, shapes, ambient]: [usize; 4],
     lane: usize,
-    point: &Point<FMA>,
-    solution: &Solution<FMA, C, P>,
-    summary: &Summary<FMA>,
-    deviations: &Deviations<FMA, C>,
+    point: &Point<ISA>,
+    solution: &Solution<ISA, C, P>,
+    summary: &Summary<ISA>,
+    deviations: &Deviations<ISA, C>,
 ) {
     let magnitudes = &solution.magnitudes;
     let shape: [f32; MAX_SHAPE] = array!(|i| point.shape_log[i].0[lane].exp());

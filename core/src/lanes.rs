@@ -1,44 +1,60 @@
-//! Eight pixels side by side, in one vector register where the processor has AVX2.
+//! Sixteen pixels side by side: one vector register with AVX-512, two with AVX2, four with SSE2.
 //!
-//! The lanes are an array in memory and a vector in the arithmetic: each operation loads, computes and stores, and the
+//! The lanes are an array in memory and vectors in the arithmetic: each operation loads, computes and stores, and the
 //! compiler drops the loads and stores in between. (Loops over the array vectorise as well, but take the compiler a hundred
-//! times longer.) `FMA` says that the code runs inside a function compiled for AVX2 and FMA, see `dispatch`; everything on
-//! the way there is `inline(always)`, or it would lose the instruction set.
+//! times longer.) `ISA` names the instructions of the function that the code is compiled into, see `dispatch`; everything
+//! on the way there is `inline(always)`, or it would lose them.
 
 use crate::number::{Mask, Number, Real};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
-pub const LANES: usize = 8;
+pub const LANES: usize = 16;
+
+/// The instructions that code is compiled for.
+pub type Isa = u8;
+/// What every processor of the architecture has: SSE2.
+pub const PLAIN: Isa = 0;
+/// AVX2 and FMA; on other architectures than x86-64, whatever has a fused multiply-add.
+pub const FUSED: Isa = 1;
+/// AVX-512 F, VL, DQ and BW.
+pub const WIDE: Isa = 2;
 
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(32))]
-pub struct Lane<const FMA: bool>(pub [f32; LANES]);
+#[repr(C, align(64))]
+pub struct Lane<const ISA: Isa>(pub [f32; LANES]);
 
 /// All bits of a lane are set where the mask holds.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub struct LaneMask(pub [u32; LANES]);
 
 #[cfg(target_arch = "x86_64")]
 mod vector {
-    //! The operations on eight lanes: AVX2 and FMA, or pairs of SSE2, which every x86-64 processor has.
-    // SAFETY, for the whole module: `FMA` is true only in code that `dispatch` runs after it has found AVX2 and FMA, and
-    // every pointer is to an array of eight elements aligned to 32 bytes.
-    use super::{Lane, LaneMask};
+    //! The operations, register by register.
+    // SAFETY, for the whole module: `ISA` names instructions that `dispatch` has found the processor to have, and every
+    // pointer is to an array of sixteen elements aligned to 64 bytes.
+    use super::{FUSED, Isa, LANES, Lane, LaneMask, WIDE};
     use std::arch::x86_64::*;
 
     macro_rules! operation {
-        ($name:ident($($argument:ident),+), $wide:ident, $narrow:ident) => {
+        ($name:ident($($argument:ident),+), $wide:ident, $fused:ident, $plain:ident) => {
             #[inline(always)]
-            pub fn $name<const FMA: bool>($($argument: &Lane<FMA>),+) -> Lane<FMA> {
-                let mut result = Lane([0.0; 8]);
+            pub fn $name<const ISA: Isa>($($argument: &Lane<ISA>),+) -> Lane<ISA> {
+                let mut result = Lane([0.0; LANES]);
+                let out = result.0.as_mut_ptr();
+                $(let $argument = $argument.0.as_ptr();)+
                 unsafe {
-                    if FMA {
-                        _mm256_store_ps(result.0.as_mut_ptr(), $wide($(_mm256_load_ps($argument.0.as_ptr())),+));
-                    } else {
-                        for i in [0, 4] {
-                            let half = $narrow($(_mm_load_ps($argument.0.as_ptr().add(i))),+);
-                            _mm_store_ps(result.0.as_mut_ptr().add(i), half);
+                    match ISA {
+                        WIDE => _mm512_store_ps(out, $wide($(_mm512_load_ps($argument)),+)),
+                        FUSED => {
+                            for i in [0, 8] {
+                                _mm256_store_ps(out.add(i), $fused($(_mm256_load_ps($argument.add(i))),+));
+                            }
+                        }
+                        _ => {
+                            for i in [0, 4, 8, 12] {
+                                _mm_store_ps(out.add(i), $plain($(_mm_load_ps($argument.add(i))),+));
+                            }
                         }
                     }
                 }
@@ -46,31 +62,31 @@ mod vector {
             }
         };
     }
-    operation!(add(a, b), _mm256_add_ps, _mm_add_ps);
-    operation!(sub(a, b), _mm256_sub_ps, _mm_sub_ps);
-    operation!(mul(a, b), _mm256_mul_ps, _mm_mul_ps);
-    operation!(div(a, b), _mm256_div_ps, _mm_div_ps);
+    operation!(add(a, b), _mm512_add_ps, _mm256_add_ps, _mm_add_ps);
+    operation!(sub(a, b), _mm512_sub_ps, _mm256_sub_ps, _mm_sub_ps);
+    operation!(mul(a, b), _mm512_mul_ps, _mm256_mul_ps, _mm_mul_ps);
+    operation!(div(a, b), _mm512_div_ps, _mm256_div_ps, _mm_div_ps);
     // Both return the second operand where either is not a number, unlike f32::min.
-    operation!(min(a, b), _mm256_min_ps, _mm_min_ps);
-    operation!(max(a, b), _mm256_max_ps, _mm_max_ps);
-    operation!(sqrt(a), _mm256_sqrt_ps, _mm_sqrt_ps);
-    operation!(mul_add(a, b, c), _mm256_fmadd_ps, narrow_mul_add);
+    operation!(min(a, b), _mm512_min_ps, _mm256_min_ps, _mm_min_ps);
+    operation!(max(a, b), _mm512_max_ps, _mm256_max_ps, _mm_max_ps);
+    operation!(sqrt(a), _mm512_sqrt_ps, _mm256_sqrt_ps, _mm_sqrt_ps);
+    operation!(mul_add(a, b, c), _mm512_fmadd_ps, _mm256_fmadd_ps, plain_mul_add);
 
     #[inline(always)]
-    unsafe fn narrow_mul_add(a: __m128, b: __m128, c: __m128) -> __m128 {
+    unsafe fn plain_mul_add(a: __m128, b: __m128, c: __m128) -> __m128 {
         unsafe { _mm_add_ps(_mm_mul_ps(a, b), c) }
     }
 
     macro_rules! mask_operation {
-        ($name:ident, $narrow:ident) => {
+        ($name:ident, $plain:ident) => {
             #[inline(always)]
             pub fn $name(a: &LaneMask, b: &LaneMask) -> LaneMask {
-                let mut result = LaneMask([0; 8]);
-                for i in [0, 4] {
+                let mut result = LaneMask([0; LANES]);
+                for i in [0, 4, 8, 12] {
                     unsafe {
                         let a = _mm_load_si128(a.0.as_ptr().add(i).cast());
                         let b = _mm_load_si128(b.0.as_ptr().add(i).cast());
-                        _mm_store_si128(result.0.as_mut_ptr().add(i).cast(), $narrow(a, b));
+                        _mm_store_si128(result.0.as_mut_ptr().add(i).cast(), $plain(a, b));
                     }
                 }
                 result
@@ -83,17 +99,26 @@ mod vector {
     mask_operation!(and_not, _mm_andnot_si128);
 
     #[inline(always)]
-    pub fn lt<const FMA: bool>(a: &Lane<FMA>, b: &Lane<FMA>) -> LaneMask {
-        let mut result = LaneMask([0; 8]);
+    pub fn lt<const ISA: Isa>(a: &Lane<ISA>, b: &Lane<ISA>) -> LaneMask {
+        let mut result = LaneMask([0; LANES]);
         let out = result.0.as_mut_ptr().cast::<f32>();
+        let (a, b) = (a.0.as_ptr(), b.0.as_ptr());
         unsafe {
-            if FMA {
-                let mask = _mm256_cmp_ps::<_CMP_LT_OQ>(_mm256_load_ps(a.0.as_ptr()), _mm256_load_ps(b.0.as_ptr()));
-                _mm256_store_ps(out, mask);
-            } else {
-                for i in [0, 4] {
-                    let mask = _mm_cmplt_ps(_mm_load_ps(a.0.as_ptr().add(i)), _mm_load_ps(b.0.as_ptr().add(i)));
-                    _mm_store_ps(out.add(i), mask);
+            match ISA {
+                WIDE => {
+                    let mask = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(_mm512_load_ps(a), _mm512_load_ps(b));
+                    _mm512_store_si512(out.cast(), _mm512_movm_epi32(mask));
+                }
+                FUSED => {
+                    for i in [0, 8] {
+                        let mask = _mm256_cmp_ps::<_CMP_LT_OQ>(_mm256_load_ps(a.add(i)), _mm256_load_ps(b.add(i)));
+                        _mm256_store_ps(out.add(i), mask);
+                    }
+                }
+                _ => {
+                    for i in [0, 4, 8, 12] {
+                        _mm_store_ps(out.add(i), _mm_cmplt_ps(_mm_load_ps(a.add(i)), _mm_load_ps(b.add(i))));
+                    }
                 }
             }
         }
@@ -101,23 +126,29 @@ mod vector {
     }
 
     #[inline(always)]
-    pub fn select<const FMA: bool>(mask: &LaneMask, yes: &Lane<FMA>, no: &Lane<FMA>) -> Lane<FMA> {
-        let mut result = Lane([0.0; 8]);
-        let bits = mask.0.as_ptr().cast::<f32>();
+    pub fn select<const ISA: Isa>(mask: &LaneMask, yes: &Lane<ISA>, no: &Lane<ISA>) -> Lane<ISA> {
+        let mut result = Lane([0.0; LANES]);
+        let out = result.0.as_mut_ptr();
+        let (mask, yes, no) = (mask.0.as_ptr().cast::<f32>(), yes.0.as_ptr(), no.0.as_ptr());
         unsafe {
-            if FMA {
-                let blended = _mm256_blendv_ps(
-                    _mm256_load_ps(no.0.as_ptr()),
-                    _mm256_load_ps(yes.0.as_ptr()),
-                    _mm256_load_ps(bits),
-                );
-                _mm256_store_ps(result.0.as_mut_ptr(), blended);
-            } else {
-                for i in [0, 4] {
-                    let bits = _mm_load_ps(bits.add(i));
-                    let yes = _mm_and_ps(bits, _mm_load_ps(yes.0.as_ptr().add(i)));
-                    let no = _mm_andnot_ps(bits, _mm_load_ps(no.0.as_ptr().add(i)));
-                    _mm_store_ps(result.0.as_mut_ptr().add(i), _mm_or_ps(yes, no));
+            match ISA {
+                WIDE => {
+                    let mask = _mm512_movepi32_mask(_mm512_load_si512(mask.cast()));
+                    _mm512_store_ps(out, _mm512_mask_blend_ps(mask, _mm512_load_ps(no), _mm512_load_ps(yes)));
+                }
+                FUSED => {
+                    for i in [0, 8] {
+                        let (yes, no) = (_mm256_load_ps(yes.add(i)), _mm256_load_ps(no.add(i)));
+                        _mm256_store_ps(out.add(i), _mm256_blendv_ps(no, yes, _mm256_load_ps(mask.add(i))));
+                    }
+                }
+                _ => {
+                    for i in [0, 4, 8, 12] {
+                        let mask = _mm_load_ps(mask.add(i));
+                        let yes = _mm_and_ps(mask, _mm_load_ps(yes.add(i)));
+                        let no = _mm_andnot_ps(mask, _mm_load_ps(no.add(i)));
+                        _mm_store_ps(out.add(i), _mm_or_ps(yes, no));
+                    }
                 }
             }
         }
@@ -127,14 +158,14 @@ mod vector {
 
 #[cfg(not(target_arch = "x86_64"))]
 mod vector {
-    //! The operations on eight lanes as loops.
-    use super::{Lane, LaneMask};
+    //! The operations as loops.
+    use super::{Isa, Lane, LaneMask, PLAIN};
     use std::array::from_fn;
 
     macro_rules! operation {
         ($name:ident($($argument:ident),+), $function:expr) => {
             #[inline(always)]
-            pub fn $name<const FMA: bool>($($argument: &Lane<FMA>),+) -> Lane<FMA> {
+            pub fn $name<const ISA: Isa>($($argument: &Lane<ISA>),+) -> Lane<ISA> {
                 Lane(from_fn(|i| $function($($argument.0[i]),+)))
             }
         };
@@ -146,7 +177,7 @@ mod vector {
     operation!(min(a, b), |a, b| if a < b { a } else { b });
     operation!(max(a, b), |a, b| if a > b { a } else { b });
     operation!(sqrt(a), f32::sqrt);
-    operation!(mul_add(a, b, c), |a, b, c| if FMA { f32::mul_add(a, b, c) } else { a * b + c });
+    operation!(mul_add(a, b, c), |a, b, c| if ISA == PLAIN { a * b + c } else { f32::mul_add(a, b, c) });
 
     #[inline(always)]
     pub fn and(a: &LaneMask, b: &LaneMask) -> LaneMask {
@@ -164,30 +195,39 @@ mod vector {
     }
 
     #[inline(always)]
-    pub fn lt<const FMA: bool>(a: &Lane<FMA>, b: &Lane<FMA>) -> LaneMask {
+    pub fn lt<const ISA: Isa>(a: &Lane<ISA>, b: &Lane<ISA>) -> LaneMask {
         LaneMask(from_fn(|i| if a.0[i] < b.0[i] { u32::MAX } else { 0 }))
     }
 
     #[inline(always)]
-    pub fn select<const FMA: bool>(mask: &LaneMask, yes: &Lane<FMA>, no: &Lane<FMA>) -> Lane<FMA> {
+    pub fn select<const ISA: Isa>(mask: &LaneMask, yes: &Lane<ISA>, no: &Lane<ISA>) -> Lane<ISA> {
         Lane(from_fn(|i| if mask.0[i] != 0 { yes.0[i] } else { no.0[i] }))
     }
 }
 
-/// Calls a function of lanes without inlining it, in a version compiled for the instructions that `FMA` stands for.
+/// Calls a function of lanes without inlining it, in a version compiled for the instructions that `ISA` names.
 ///
 /// The fit's larger pieces are called so: inlined wherever they are used they would take minutes to compile.
 #[inline(always)]
-pub fn outlined<const FMA: bool, T>(function: impl FnOnce() -> T) -> T {
+pub fn outlined<const ISA: Isa, T>(function: impl FnOnce() -> T) -> T {
     #[cfg(target_arch = "x86_64")]
-    if FMA {
+    {
         #[inline(never)]
-        #[target_feature(enable = "avx2,fma")]
-        fn fast<T>(function: impl FnOnce() -> T) -> T {
+        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma")]
+        fn wide<T>(function: impl FnOnce() -> T) -> T {
             function()
         }
-        // SAFETY: FMA is true only in code that `dispatch` runs after it has found AVX2 and FMA.
-        return unsafe { fast(function) };
+        #[inline(never)]
+        #[target_feature(enable = "avx2,fma")]
+        fn fused<T>(function: impl FnOnce() -> T) -> T {
+            function()
+        }
+        // SAFETY: `ISA` names instructions that `dispatch` has found the processor to have.
+        match ISA {
+            WIDE => return unsafe { wide(function) },
+            FUSED => return unsafe { fused(function) },
+            _ => {}
+        }
     }
     #[inline(never)]
     fn plain<T>(function: impl FnOnce() -> T) -> T {
@@ -248,7 +288,7 @@ impl Not for LaneMask {
 
 macro_rules! arithmetic {
     ($trait:ident, $method:ident) => {
-        impl<const FMA: bool> $trait for Lane<FMA> {
+        impl<const ISA: Isa> $trait for Lane<ISA> {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
@@ -262,7 +302,7 @@ arithmetic!(Sub, sub);
 arithmetic!(Mul, mul);
 arithmetic!(Div, div);
 
-impl<const FMA: bool> Neg for Lane<FMA> {
+impl<const ISA: Isa> Neg for Lane<ISA> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -270,7 +310,7 @@ impl<const FMA: bool> Neg for Lane<FMA> {
     }
 }
 
-impl<const FMA: bool> Lane<FMA> {
+impl<const ISA: Isa> Lane<ISA> {
     #[inline(always)]
     pub fn abs(self) -> Self {
         self.max(-self)
@@ -318,7 +358,7 @@ impl<const FMA: bool> Lane<FMA> {
     }
 }
 
-impl<const FMA: bool> Number for Lane<FMA> {
+impl<const ISA: Isa> Number for Lane<ISA> {
     type Real = Self;
 
     #[inline(always)]
@@ -388,7 +428,7 @@ impl<const FMA: bool> Number for Lane<FMA> {
     }
 }
 
-impl<const FMA: bool> Real for Lane<FMA> {
+impl<const ISA: Isa> Real for Lane<ISA> {
     type Mask = LaneMask;
 
     #[inline(always)]
@@ -401,7 +441,7 @@ impl<const FMA: bool> Real for Lane<FMA> {
 mod tests {
     use super::*;
 
-    fn check(function: impl Fn(Lane<false>) -> Lane<false>, exact: impl Fn(f64) -> f64, range: (f64, f64), bound: f64) {
+    fn check(function: impl Fn(Lane<PLAIN>) -> Lane<PLAIN>, exact: impl Fn(f64) -> f64, range: (f64, f64), bound: f64) {
         for i in 0..=10_000 {
             let x = (range.0 + (range.1 - range.0) * i as f64 / 10_000.0) as f32;
             let (got, want) = (function(Lane([x; LANES])).0[3] as f64, exact(x as f64));

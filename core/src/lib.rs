@@ -8,6 +8,7 @@
 mod arrow;
 mod dispatch;
 mod dual;
+mod fresnel;
 mod geometry;
 mod joint;
 mod lanes;

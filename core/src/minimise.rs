@@ -1,22 +1,22 @@
-//! Bounded Levenberg-Marquardt, eight independent problems side by side.
+//! Bounded Levenberg-Marquardt, independent problems side by side.
 //!
 //! [Levenberg1944], [Marquardt1963]; damping scaled by the Hessian's diagonal. Each lane has its own damping and stops on its
 //! own; finished lanes keep their point while the others go on (repacking them gained nothing).
 
-use crate::lanes::{Lane, LaneMask, outlined};
+use crate::lanes::{Isa, Lane, LaneMask, outlined};
 use crate::number::{Mask, Number, Real};
 
 /// A cost, half its descent direction and the Gauss-Newton approximation of half its Hessian at a point.
 #[derive(Clone, Copy)]
-pub struct Quadratic<const FMA: bool, const P: usize> {
-    pub cost: Lane<FMA>,
+pub struct Quadratic<const ISA: Isa, const P: usize> {
+    pub cost: Lane<ISA>,
     /// JᵀW r with r = data − model: minus half the cost's gradient.
-    pub descent: [Lane<FMA>; P],
+    pub descent: [Lane<ISA>; P],
     /// JᵀW J; the upper triangle is used.
-    pub hessian: [[Lane<FMA>; P]; P],
+    pub hessian: [[Lane<ISA>; P]; P],
 }
 
-impl<const FMA: bool, const P: usize> Quadratic<FMA, P> {
+impl<const ISA: Isa, const P: usize> Quadratic<ISA, P> {
     #[inline(always)]
     pub fn zero() -> Self {
         let zero = Lane::splat(0.0);
@@ -38,22 +38,22 @@ impl<const FMA: bool, const P: usize> Quadratic<FMA, P> {
 }
 
 /// A least-squares problem in P parameters that live on some manifold of points.
-pub trait Objective<const FMA: bool, const P: usize> {
+pub trait Objective<const ISA: Isa, const P: usize> {
     type Point: Copy;
 
-    fn quadratic(&mut self, point: &Self::Point) -> Quadratic<FMA, P>;
+    fn quadratic(&mut self, point: &Self::Point) -> Quadratic<ISA, P>;
     /// The point reached by a step, moved back inside the bounds.
-    fn moved(&self, point: &Self::Point, step: &[Lane<FMA>; P]) -> Self::Point;
+    fn moved(&self, point: &Self::Point, step: &[Lane<ISA>; P]) -> Self::Point;
     /// Parameters that lie at a bound which `descent` pushes against.
-    fn blocked(&self, point: &Self::Point, descent: &[Lane<FMA>; P]) -> [LaneMask; P];
+    fn blocked(&self, point: &Self::Point, descent: &[Lane<ISA>; P]) -> [LaneMask; P];
     fn select(mask: LaneMask, yes: &Self::Point, no: &Self::Point) -> Self::Point;
     /// Called with each point the minimiser has settled on so far; the lanes of `mask` have just moved there.
     fn accepted(&mut self, _point: &Self::Point, _mask: LaneMask) {}
 }
 
-pub struct Outcome<Point, const FMA: bool> {
+pub struct Outcome<Point, const ISA: Isa> {
     pub point: Point,
-    pub cost: Lane<FMA>,
+    pub cost: Lane<ISA>,
     /// Lanes whose cost had stopped changing before the steps ran out.
     pub converged: LaneMask,
 }
@@ -63,25 +63,25 @@ pub struct Outcome<Point, const FMA: bool> {
 const TOLERANCE: f64 = 3e-5;
 
 #[inline(always)]
-pub fn minimise<const FMA: bool, const P: usize, O: Objective<FMA, P>>(
+pub fn minimise<const ISA: Isa, const P: usize, O: Objective<ISA, P>>(
     objective: &mut O,
     start: &O::Point,
     wanted: LaneMask,
     max_steps: usize,
-) -> Outcome<O::Point, FMA> {
-    outlined::<FMA, _>(
+) -> Outcome<O::Point, ISA> {
+    outlined::<ISA, _>(
         #[inline(always)]
         || minimise_inline(objective, start, wanted, max_steps),
     )
 }
 
 #[inline(always)]
-fn minimise_inline<const FMA: bool, const P: usize, O: Objective<FMA, P>>(
+fn minimise_inline<const ISA: Isa, const P: usize, O: Objective<ISA, P>>(
     objective: &mut O,
     start: &O::Point,
     wanted: LaneMask,
     max_steps: usize,
-) -> Outcome<O::Point, FMA> {
+) -> Outcome<O::Point, ISA> {
     let mut point = *start;
     let mut trial_point = *start;
     let mut current = Quadratic::zero();
@@ -121,11 +121,11 @@ fn minimise_inline<const FMA: bool, const P: usize, O: Objective<FMA, P>>(
 
 /// Solves (H + damping · diag H) step = descent by LDLᵀ, with blocked parameters held.
 #[inline(always)]
-fn damped_step<const FMA: bool, const P: usize>(
-    at: &Quadratic<FMA, P>,
-    damping: Lane<FMA>,
+fn damped_step<const ISA: Isa, const P: usize>(
+    at: &Quadratic<ISA, P>,
+    damping: Lane<ISA>,
     blocked: &[LaneMask; P],
-) -> [Lane<FMA>; P] {
+) -> [Lane<ISA>; P] {
     let zero = Lane::splat(0.0);
     let mut matrix = at.hessian;
     let mut right = at.descent;
@@ -141,10 +141,10 @@ fn damped_step<const FMA: bool, const P: usize>(
 
 /// Solves a symmetric positive semidefinite system given by its upper triangle. A parameter that nothing depends on gets 0.
 #[inline(always)]
-pub fn solve_symmetric<const FMA: bool, const P: usize>(
-    mut matrix: [[Lane<FMA>; P]; P],
-    mut right: [Lane<FMA>; P],
-) -> [Lane<FMA>; P] {
+pub fn solve_symmetric<const ISA: Isa, const P: usize>(
+    mut matrix: [[Lane<ISA>; P]; P],
+    mut right: [Lane<ISA>; P],
+) -> [Lane<ISA>; P] {
     let mut inverse = [Lane::splat(0.0); P];
     for i in 0..P {
         let pivot = matrix[i][i];
@@ -171,7 +171,7 @@ pub fn solve_symmetric<const FMA: bool, const P: usize>(
 /// The inverse of a symmetric positive definite matrix given by its upper triangle; rows and columns of parameters that
 /// nothing depends on are 0.
 #[inline(always)]
-pub fn inverse<const FMA: bool, const P: usize>(matrix: &[[Lane<FMA>; P]; P]) -> [[Lane<FMA>; P]; P] {
+pub fn inverse<const ISA: Isa, const P: usize>(matrix: &[[Lane<ISA>; P]; P]) -> [[Lane<ISA>; P]; P] {
     let mut columns = [[Lane::splat(0.0); P]; P];
     for i in 0..P {
         let mut unit = [Lane::splat(0.0); P];
@@ -184,17 +184,18 @@ pub fn inverse<const FMA: bool, const P: usize>(matrix: &[[Lane<FMA>; P]; P]) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::LANES;
+    use crate::lanes::{LANES, PLAIN};
+    use crate::number::array;
 
     struct Rosenbrock {
         lower: f32,
     }
 
     /// r = (10 (y − x²), 1 − x), written as data − model; x bounded below.
-    impl Objective<false, 2> for Rosenbrock {
-        type Point = [Lane<false>; 2];
+    impl Objective<PLAIN, 2> for Rosenbrock {
+        type Point = [Lane<PLAIN>; 2];
 
-        fn quadratic(&mut self, point: &Self::Point) -> Quadratic<false, 2> {
+        fn quadratic(&mut self, point: &Self::Point) -> Quadratic<PLAIN, 2> {
             let [x, y] = *point;
             let ten = Lane::splat(10.0);
             let first = ten * (y - x * x);
@@ -213,10 +214,10 @@ mod tests {
             }
             result
         }
-        fn moved(&self, point: &Self::Point, step: &[Lane<false>; 2]) -> Self::Point {
+        fn moved(&self, point: &Self::Point, step: &[Lane<PLAIN>; 2]) -> Self::Point {
             [(point[0] + step[0]).max(Lane([self.lower; LANES])), point[1] + step[1]]
         }
-        fn blocked(&self, point: &Self::Point, descent: &[Lane<false>; 2]) -> [LaneMask; 2] {
+        fn blocked(&self, point: &Self::Point, descent: &[Lane<PLAIN>; 2]) -> [LaneMask; 2] {
             [LaneMask::new(|i| point[0].0[i] <= self.lower && descent[0].0[i] < 0.0), LaneMask::NONE]
         }
         fn select(mask: LaneMask, yes: &Self::Point, no: &Self::Point) -> Self::Point {
@@ -225,9 +226,10 @@ mod tests {
     }
 
     #[test]
-    fn finds_the_minimum_of_rosenbrocks_valley_from_eight_starts() {
-        let start =
-            [Lane([-1.2, 0.0, 2.0, -2.0, 0.5, 1.5, -0.5, 3.0]), Lane([1.0, 0.0, -1.0, 2.0, 0.5, 0.0, 1.0, 1.0])];
+    fn finds_the_minimum_of_rosenbrocks_valley_from_many_starts() {
+        let x = [-1.2, 0.0, 2.0, -2.0, 0.5, 1.5, -0.5, 3.0];
+        let y = [1.0, 0.0, -1.0, 2.0, 0.5, 0.0, 1.0, 1.0];
+        let start = [Lane(array!(|i| x[i % 8])), Lane(array!(|i| y[i / 2]))];
         let all = LaneMask::ALL;
         let outcome = minimise(&mut Rosenbrock { lower: -10.0 }, &start, all, 200);
         for i in 0..LANES {

@@ -1,7 +1,7 @@
-//! What was measured at eight pixels: radiance and weight of every sample, gathered from the stack as it was decoded.
+//! What was measured at a group of pixels: radiance and weight of every sample, gathered from the stack as it was decoded.
 
 use crate::geometry::{Illumination, Place};
-use crate::lanes::{LANES, Lane, LaneMask};
+use crate::lanes::{Isa, LANES, Lane, LaneMask};
 use crate::number::{Number, Real, array};
 
 /// Samples as stored: (light, pixel, channel), linear.
@@ -47,9 +47,9 @@ impl Stack<'_> {
         self.camera.near() || self.lights.iter().any(Place::near)
     }
 
-    /// The samples of one light at eight pixels, per channel, as stored.
+    /// The samples of one light at a group of pixels, per channel, as stored.
     #[inline(always)]
-    fn stored<const FMA: bool, const C: usize>(&self, light: usize, pixel: &[usize; LANES]) -> [Lane<FMA>; C] {
+    fn stored<const ISA: Isa, const C: usize>(&self, light: usize, pixel: &[usize; LANES]) -> [Lane<ISA>; C] {
         let mut result = [Lane([0.0; LANES]); C];
         for i in 0..LANES {
             let first = (light * self.pixels + pixel[i]) * self.channels;
@@ -72,38 +72,43 @@ impl Stack<'_> {
     }
 }
 
-/// One light's samples at eight pixels. Radiance is per unit of irradiance, so that models need not know of intensities.
+/// One light's samples at a group of pixels. Radiance is per unit of irradiance, so that models need not know of intensities.
 #[derive(Clone, Copy)]
-pub struct Observation<const FMA: bool, const C: usize> {
-    pub radiance: [Lane<FMA>; C],
+pub struct Observation<const ISA: Isa, const C: usize> {
+    pub radiance: [Lane<ISA>; C],
     /// Inverse variance; 0 for a sample that is clipped, in shadow or missing.
-    pub weight: [Lane<FMA>; C],
+    pub weight: [Lane<ISA>; C],
 }
 
-/// Everything known of a group of eight pixels. The buffers are reused from group to group.
-pub struct Group<const FMA: bool, const C: usize> {
+/// Everything known of a group of pixels. The buffers are reused from group to group.
+pub struct Group<const ISA: Isa, const C: usize> {
     /// Channels that the stack has, at most C; the others have no weight.
     pub channels: usize,
-    pub observations: Vec<Observation<FMA, C>>,
+    index: f64,
+    pub observations: Vec<Observation<ISA, C>>,
     /// The irradiance that each light's radiance was divided by.
-    pub irradiance: Vec<[Lane<FMA>; C]>,
-    pub illuminations: Vec<Illumination<Lane<FMA>>>,
+    pub irradiance: Vec<[Lane<ISA>; C]>,
+    per_irradiance: Vec<[Lane<ISA>; C]>,
+    pub illuminations: Vec<Illumination<Lane<ISA>>>,
     /// Lights with at least one usable sample, per pixel.
-    pub usable_lights: Lane<FMA>,
+    pub usable_lights: Lane<ISA>,
     /// Usable samples of all channels, per pixel.
-    pub usable_samples: Lane<FMA>,
+    pub usable_samples: Lane<ISA>,
     /// Clipped samples, per pixel.
-    pub clipped: Lane<FMA>,
+    pub clipped: Lane<ISA>,
 }
 
-impl<const FMA: bool, const C: usize> Group<FMA, C> {
-    pub fn new(stack: &Stack) -> Self {
+impl<const ISA: Isa, const C: usize> Group<ISA, C> {
+    /// `index` is that of refraction.
+    pub fn new(stack: &Stack, index: f64) -> Self {
         let zero = [Lane::splat(0.0); C];
         let observation = Observation { radiance: zero, weight: zero };
         let mut group = Group {
             channels: stack.channels,
+            index,
             observations: vec![observation; stack.lights.len()],
             irradiance: vec![zero; stack.lights.len()],
+            per_irradiance: vec![zero; stack.lights.len()],
             illuminations: Vec::with_capacity(stack.lights.len()),
             usable_lights: Lane::splat(0.0),
             usable_samples: Lane::splat(0.0),
@@ -115,20 +120,21 @@ impl<const FMA: bool, const C: usize> Group<FMA, C> {
 
     /// Directions for pixels at these positions, and the irradiances.
     #[inline(always)]
-    fn illuminate(&mut self, stack: &Stack, x_mm: Lane<FMA>, y_mm: Lane<FMA>) {
+    fn illuminate(&mut self, stack: &Stack, x_mm: Lane<ISA>, y_mm: Lane<ISA>) {
         let (view, _) = stack.camera.seen_from(x_mm, y_mm);
         self.illuminations.clear();
         for (light, place) in stack.lights.iter().enumerate() {
             let (direction, falloff) = place.seen_from(x_mm, y_mm);
-            self.illuminations.push(Illumination::new(direction, view));
+            self.illuminations.push(Illumination::new(direction, view, self.index));
             for channel in 0..stack.channels {
-                let intensity = Lane([stack.intensity[light * stack.channels + channel]; LANES]);
-                self.irradiance[light][channel] = intensity * falloff;
+                let irradiance = Lane([stack.intensity[light * stack.channels + channel]; LANES]) * falloff;
+                self.irradiance[light][channel] = irradiance;
+                self.per_irradiance[light][channel] = Lane::splat(1.0) / irradiance;
             }
         }
     }
 
-    /// Reads the eight pixels from `start` on; past the end of the tile the last pixel is repeated.
+    /// Reads the a group of pixels from `start` on; past the end of the tile the last pixel is repeated.
     #[inline(always)]
     pub fn gather(&mut self, stack: &Stack, start: usize) {
         let pixel: [usize; LANES] = array!(|i| (start + i).min(stack.pixels - 1));
@@ -147,7 +153,7 @@ impl<const FMA: bool, const C: usize> Group<FMA, C> {
         self.usable_samples = zero;
         self.clipped = zero;
         for (light, observation) in self.observations.iter_mut().enumerate() {
-            let stored = stack.stored::<FMA, C>(light, &pixel);
+            let stored = stack.stored::<ISA, C>(light, &pixel);
             let mut left_out = LaneMask::NONE;
             if let Some(mask) = stack.sample_mask {
                 left_out = LaneMask(array!(|i| u32::from(mask[light * stack.pixels + pixel[i]] == 0).wrapping_sub(1)));
@@ -162,7 +168,7 @@ impl<const FMA: bool, const C: usize> Group<FMA, C> {
                 let positive = radiance.max(zero);
                 let variance = positive.mul_add(positive.mul_add(relative_variance, photon), read_variance);
                 let irradiance = self.irradiance[light][channel];
-                observation.radiance[channel] = radiance / irradiance;
+                observation.radiance[channel] = radiance * self.per_irradiance[light][channel];
                 observation.weight[channel] = Lane::select(usable, irradiance * irradiance / variance, zero);
                 any_usable = any_usable | usable;
                 self.usable_samples = self.usable_samples + Lane::select(usable, one, zero);

@@ -7,8 +7,8 @@
 
 use crate::geometry::{Illumination, dot, normalise};
 use crate::joint::Options;
-use crate::lanes::{Lane, LaneMask};
-use crate::minimise::{Objective, Outcome, minimise};
+use crate::lanes::{Isa, Lane, LaneMask};
+use crate::minimise::{Outcome, minimise};
 use crate::models::{Basis, Lambert, MAX_SHAPE, Model, Optics, ShapeParameter};
 use crate::number::{Number, Real, array};
 use crate::observations::{Group, Stack};
@@ -61,31 +61,31 @@ impl Model for UniformAmbient {
 }
 
 /// The result of the diffuse stage.
-struct Diffuse<const FMA: bool, const C: usize> {
-    normal: [Lane<FMA>; 3],
-    magnitude: [Lane<FMA>; C],
-    ambient: Lane<FMA>,
+struct Diffuse<const ISA: Isa, const C: usize> {
+    normal: [Lane<ISA>; 3],
+    magnitude: [Lane<ISA>; C],
+    ambient: Lane<ISA>,
     /// Pixels with as many lights outside the threshold as the stage has unknowns.
     enough: LaneMask,
     converged: LaneMask,
 }
 
-pub struct PaperFit<'a, M, const FMA: bool, const C: usize> {
+pub struct PaperFit<'a, M, const ISA: Isa, const C: usize> {
     stack: &'a Stack<'a>,
     sample: Sample,
     options: Options,
-    colour: [Lane<FMA>; C],
-    group: Group<FMA, C>,
+    colour: [Lane<ISA>; C],
+    group: Group<ISA, C>,
     /// The group with the lights near the highlight left out.
-    far: Group<FMA, C>,
-    grey: Vec<Grey<FMA>>,
-    remainders: Vec<Remainder<FMA>>,
-    diffuse_scratch: Scratch<FMA, C, 2>,
-    scratch: Scratch<FMA, C, 3>,
+    far: Group<ISA, C>,
+    grey: Vec<Grey<ISA>>,
+    remainders: Vec<Remainder<ISA>>,
+    diffuse_scratch: Scratch<ISA, C, 2>,
+    scratch: Scratch<ISA, C, 3>,
     model: PhantomData<M>,
 }
 
-impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
+impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
     /// Whether the procedure is defined for the model: one lobe of one shape parameter.
     pub const APPLIES: bool = M::LOBES == 1 && M::SHAPE.len() == 1;
 
@@ -95,8 +95,8 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
             sample,
             options,
             colour: std::array::from_fn(|k| Lane::splat(colour.get(k).copied().unwrap_or(0.0))),
-            group: Group::new(stack),
-            far: Group::new(stack),
+            group: Group::new(stack, options.optics.index),
+            far: Group::new(stack, options.optics.index),
             grey: Vec::with_capacity(stack.lights.len()),
             remainders: Vec::with_capacity(stack.lights.len()),
             diffuse_scratch: Scratch::new(stack.lights.len()),
@@ -126,7 +126,9 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
         };
         let nearest = Lane::splat(self.sample.threshold.cos());
         self.far.usable_lights = Lane::splat(0.0);
-        self.far.illuminations.clone_from(&self.group.illuminations);
+        if self.stack.near() {
+            self.far.illuminations.clone_from(&self.group.illuminations);
+        }
         for (light, observation) in self.group.observations.iter().enumerate() {
             let excluded = dot(peak, self.group.illuminations[light].light).gt(nearest);
             let mut left = *observation;
@@ -142,14 +144,14 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
 
     /// Step 3. Lights in one plane leave φn undetermined: it stays 0, and Ad is then Ad cos φn.
     #[inline(always)]
-    fn fit_diffuse<D: Model>(&mut self, colour: [Lane<FMA>; C]) -> Diffuse<FMA, C> {
+    fn fit_diffuse<D: Model>(&mut self, colour: [Lane<ISA>; C]) -> Diffuse<ISA, C> {
         let begin = Point {
             normal: diffuse_normal(&self.grey, &self.far.illuminations, 1),
             shape_log: [Lane::splat(0.0); MAX_SHAPE],
         };
         let unknowns = 3 + usize::from(self.options.ambient);
         let enough = !self.far.usable_lights.lt(Lane::splat(unknowns as f64));
-        let mut problem: Separable<'_, D, FMA, C, 2> =
+        let mut problem: Separable<'_, D, ISA, C, 2> =
             Separable::new(&self.far, colour, self.options.optics, Loss::Linear, false, &mut self.diffuse_scratch);
         problem.prior = false;
         let outcome = minimise(&mut problem, &begin, enough, self.options.max_steps);
@@ -166,8 +168,8 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
 
     /// Step 5, literally.
     #[inline(always)]
-    fn fit_shape(&mut self, diffuse: &Diffuse<FMA, C>) -> Shape<FMA, C> {
-        let mut problem = ShapeFit::<M, FMA>::new(
+    fn fit_shape(&mut self, diffuse: &Diffuse<ISA, C>) -> Shape<ISA, C> {
+        let mut problem = ShapeFit::<M, ISA>::new(
             &self.group,
             diffuse.normal,
             diffuse.magnitude,
@@ -177,7 +179,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
             &mut self.remainders,
         );
         let begin = problem.start();
-        let outcome: Outcome<Tilts<FMA>, FMA> = minimise(&mut problem, &begin, diffuse.enough, self.options.max_steps);
+        let outcome: Outcome<Tilts<ISA>, ISA> = minimise(&mut problem, &begin, diffuse.enough, self.options.max_steps);
         let normal = problem.normal(outcome.point.phi);
         // Ad cos φn is what the diffuse stage saw, as its φn was 0.
         let in_plane = (normal[0] * normal[0] + normal[2] * normal[2]).sqrt();
@@ -187,7 +189,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
             magnitude: array!(|k| diffuse.magnitude[k] * scale),
             shape_log: outcome.point.shape_log,
             view_tilt: outcome.point.view,
-            cost: problem.quadratic(&outcome.point).cost,
+            cost: outcome.cost,
             converged: outcome.converged,
             at_bound: problem.at_bound(&outcome.point),
         }
@@ -195,11 +197,11 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
 
     /// The refined form of steps 3 and 5.
     #[inline(always)]
-    fn refine(&mut self, diffuse: &Diffuse<FMA, C>) -> Shape<FMA, C> {
+    fn refine(&mut self, diffuse: &Diffuse<ISA, C>) -> Shape<ISA, C> {
         let optics = self.options.optics;
         let specular = [Lane::splat(self.sample.specular)];
         let begin = {
-            let problem = ShapeFit::<M, FMA>::new(
+            let problem = ShapeFit::<M, ISA>::new(
                 &self.group,
                 diffuse.normal,
                 diffuse.magnitude,
@@ -210,7 +212,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
             );
             problem.start_out_of_plane()
         };
-        let mut problem: Separable<'_, M, FMA, C, 3> =
+        let mut problem: Separable<'_, M, ISA, C, 3> =
             Separable::new(&self.group, self.colour, self.options.optics, Loss::Linear, false, &mut self.scratch);
         problem.prior = false;
         problem.fixed_specular = Some(specular);
@@ -231,7 +233,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
     }
 
     #[inline(always)]
-    fn write(&self, diffuse: &Diffuse<FMA, C>, fitted: &Shape<FMA, C>, rows: &mut [f32], status: &mut [u8]) {
+    fn write(&self, diffuse: &Diffuse<ISA, C>, fitted: &Shape<ISA, C>, rows: &mut [f32], status: &mut [u8]) {
         let channels = self.stack.channels;
         let width = FitGroup::layout(self).width();
         let mut samples = Lane::splat(0.0);
@@ -278,7 +280,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize> PaperFit<'a, M, FMA, C> {
     }
 }
 
-impl<M: Model, const FMA: bool, const C: usize> FitGroup for PaperFit<'_, M, FMA, C> {
+impl<M: Model, const ISA: Isa, const C: usize> FitGroup for PaperFit<'_, M, ISA, C> {
     fn layout(&self) -> Layout {
         Layout::paper(self.stack.channels)
     }
@@ -306,12 +308,12 @@ impl<M: Model, const FMA: bool, const C: usize> FitGroup for PaperFit<'_, M, FMA
 }
 
 /// What the last stage adds.
-struct Shape<const FMA: bool, const C: usize> {
-    normal: [Lane<FMA>; 3],
-    magnitude: [Lane<FMA>; C],
-    shape_log: Lane<FMA>,
-    view_tilt: Lane<FMA>,
-    cost: Lane<FMA>,
+struct Shape<const ISA: Isa, const C: usize> {
+    normal: [Lane<ISA>; 3],
+    magnitude: [Lane<ISA>; C],
+    shape_log: Lane<ISA>,
+    view_tilt: Lane<ISA>,
+    cost: Lane<ISA>,
     converged: LaneMask,
     at_bound: LaneMask,
 }

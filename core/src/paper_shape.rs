@@ -5,7 +5,7 @@
 
 use crate::dual::Dual;
 use crate::geometry::{Illumination, dot, normalise};
-use crate::lanes::{Lane, LaneMask, outlined};
+use crate::lanes::{Isa, Lane, LaneMask, outlined};
 use crate::minimise::{Objective, Quadratic};
 use crate::models::{MAX_SHAPE, MAX_STARTS, Model, Optics};
 use crate::number::{Number, Real, array};
@@ -21,10 +21,10 @@ const PHI_MAX: f64 = 0.7;
 const PHI_STARTS: [f64; 3] = [0.0, 0.04, 0.12];
 
 #[derive(Clone, Copy)]
-pub struct Tilts<const FMA: bool> {
-    pub view: Lane<FMA>,
-    pub shape_log: Lane<FMA>,
-    pub phi: Lane<FMA>,
+pub struct Tilts<const ISA: Isa> {
+    pub view: Lane<ISA>,
+    pub shape_log: Lane<ISA>,
+    pub phi: Lane<ISA>,
 }
 
 /// What the diffuse term leaves of one light's samples, all channels in one.
@@ -32,21 +32,21 @@ pub struct Tilts<const FMA: bool> {
 /// The lobe reaches channel k as As s_k times its value, s the light's colour: of the channels' residuals only their
 /// projection on s depends on the lobe, and that is one number with one weight.
 #[derive(Clone, Copy)]
-pub struct Remainder<const FMA: bool> {
-    value: Lane<FMA>,
-    weight: Lane<FMA>,
+pub struct Remainder<const ISA: Isa> {
+    value: Lane<ISA>,
+    weight: Lane<ISA>,
 }
 
-pub struct ShapeFit<'a, M, const FMA: bool> {
-    illuminations: &'a [Illumination<Lane<FMA>>],
-    remainders: &'a [Remainder<FMA>],
+pub struct ShapeFit<'a, M, const ISA: Isa> {
+    illuminations: &'a [Illumination<Lane<ISA>>],
+    remainders: &'a [Remainder<ISA>],
     /// The part of the cost that no lobe changes.
-    constant: Lane<FMA>,
-    normal: [Lane<FMA>; 3],
-    specular: Lane<FMA>,
+    constant: Lane<ISA>,
+    normal: [Lane<ISA>; 3],
+    specular: Lane<ISA>,
     optics: Optics,
     /// θv and φv as calibrated.
-    view: (Lane<FMA>, Lane<FMA>),
+    view: (Lane<ISA>, Lane<ISA>),
     model: PhantomData<M>,
 }
 
@@ -57,17 +57,17 @@ fn rotated<R: Real>(normal: [R; 3], sine: R, cosine: R) -> [R; 3] {
     [cosine * normal[0] / in_plane, sine, cosine * normal[2] / in_plane]
 }
 
-impl<'a, M: Model, const FMA: bool> ShapeFit<'a, M, FMA> {
+impl<'a, M: Model, const ISA: Isa> ShapeFit<'a, M, ISA> {
     /// `magnitude` is the diffuse stage's; the diffuse term keeps the normal of that stage.
     #[inline(always)]
     pub fn new<const C: usize>(
-        group: &'a Group<FMA, C>,
-        normal: [Lane<FMA>; 3],
-        magnitude: [Lane<FMA>; C],
-        colour: [Lane<FMA>; C],
-        specular: Lane<FMA>,
+        group: &'a Group<ISA, C>,
+        normal: [Lane<ISA>; 3],
+        magnitude: [Lane<ISA>; C],
+        colour: [Lane<ISA>; C],
+        specular: Lane<ISA>,
         optics: Optics,
-        remainders: &'a mut Vec<Remainder<FMA>>,
+        remainders: &'a mut Vec<Remainder<ISA>>,
     ) -> Self {
         let zero = Lane::splat(0.0);
         let mut constant = zero;
@@ -102,15 +102,15 @@ impl<'a, M: Model, const FMA: bool> ShapeFit<'a, M, FMA> {
     }
 
     #[inline(always)]
-    pub fn normal(&self, phi: Lane<FMA>) -> [Lane<FMA>; 3] {
+    pub fn normal(&self, phi: Lane<ISA>) -> [Lane<ISA>; 3] {
         let (sine, cosine) = sine_cosine(phi);
         rotated(self.normal, sine, cosine)
     }
 
     /// The shape of the grid and the tilt out of the plane, of `tilts`, that fit best, seen from `view`.
     #[inline(always)]
-    fn search(&self, view: Option<[Lane<FMA>; 3]>, tilts: [Lane<FMA>; PHI_STARTS.len()]) -> (Lane<FMA>, Lane<FMA>) {
-        outlined::<FMA, _>(
+    fn search(&self, view: Option<[Lane<ISA>; 3]>, tilts: [Lane<ISA>; PHI_STARTS.len()]) -> (Lane<ISA>, Lane<ISA>) {
+        outlined::<ISA, _>(
             #[inline(always)]
             || self.search_inline(view, tilts),
         )
@@ -119,9 +119,9 @@ impl<'a, M: Model, const FMA: bool> ShapeFit<'a, M, FMA> {
     #[inline(always)]
     fn search_inline(
         &self,
-        view: Option<[Lane<FMA>; 3]>,
-        tilts: [Lane<FMA>; PHI_STARTS.len()],
-    ) -> (Lane<FMA>, Lane<FMA>) {
+        view: Option<[Lane<ISA>; 3]>,
+        tilts: [Lane<ISA>; PHI_STARTS.len()],
+    ) -> (Lane<ISA>, Lane<ISA>) {
         let mut best_cost = Lane::splat(f64::from(f32::MAX));
         let mut best = (Lane::splat(M::STARTS[0][0].ln()), tilts[0]);
         for tilt in tilts {
@@ -130,7 +130,7 @@ impl<'a, M: Model, const FMA: bool> ShapeFit<'a, M, FMA> {
             for (remainder, calibrated) in self.remainders.iter().zip(self.illuminations) {
                 let mut at = *calibrated;
                 if let Some(view) = view {
-                    at = Illumination::new(at.light, view);
+                    at = Illumination::new(at.light, view, self.optics.index);
                 }
                 for (cost, shape) in costs.iter_mut().zip(M::STARTS) {
                     let lobe = M::basis(normal, &[Lane::splat(shape[0])], &at, &self.optics).specular[0];
@@ -150,7 +150,7 @@ impl<'a, M: Model, const FMA: bool> ShapeFit<'a, M, FMA> {
 
     /// The best of a grid of shapes and φn, with θv as calibrated.
     #[inline(always)]
-    pub fn start(&self) -> Tilts<FMA> {
+    pub fn start(&self) -> Tilts<ISA> {
         let (sine, cosine) = sine_cosine(self.view.0);
         let (shape_log, phi) =
             self.search(Some([sine, Lane::splat(0.0), cosine]), array!(|i| Lane::splat(PHI_STARTS[i])));
@@ -160,7 +160,7 @@ impl<'a, M: Model, const FMA: bool> ShapeFit<'a, M, FMA> {
     /// The same grid for the calibrated view. The highlight lies at φn = φv/2; its height does not tell on which side of it
     /// the normal is, so the search begins on the side of the painting's own normal.
     #[inline(always)]
-    pub fn start_out_of_plane(&self) -> Point<FMA> {
+    pub fn start_out_of_plane(&self) -> Point<ISA> {
         let half = self.view.1 * Lane::splat(0.5);
         let away = Lane::select(half.lt(Lane::splat(0.0)), Lane::splat(1.0), Lane::splat(-1.0));
         let (shape, phi) = self.search(None, array!(|i| half + away * Lane::splat(PHI_STARTS[i])));
@@ -170,7 +170,7 @@ impl<'a, M: Model, const FMA: bool> ShapeFit<'a, M, FMA> {
     }
 
     #[inline(always)]
-    fn quadratic_inline(&self, point: &Tilts<FMA>) -> Quadratic<FMA, 3> {
+    fn quadratic_inline(&self, point: &Tilts<ISA>) -> Quadratic<ISA, 3> {
         let shape = point.shape_log.exp();
         let dual_shape = Dual::<_, 2>::parameter(shape, 0, shape);
         let (sine, cosine) = sine_cosine(point.phi);
@@ -189,9 +189,9 @@ impl<'a, M: Model, const FMA: bool> ShapeFit<'a, M, FMA> {
         let mut quadratic = Quadratic::zero();
         quadratic.cost = self.constant;
         for (remainder, calibrated) in self.remainders.iter().zip(self.illuminations) {
-            let at = Illumination::new(calibrated.light, view);
+            let at = Illumination::new(calibrated.light, view, self.optics.index);
             let lobe = M::basis(dual_normal, &[dual_shape], &at, &self.optics).specular[0];
-            let at_ahead = Illumination::new(at.light, view_ahead);
+            let at_ahead = Illumination::new(at.light, view_ahead, self.optics.index);
             let ahead = M::basis(normal, &[shape], &at_ahead, &self.optics).specular[0];
             let slopes = [(ahead - lobe.value) * per_step, lobe.derivative[0], lobe.derivative[1]];
             let residual = remainder.value - self.specular * lobe.value;
@@ -208,12 +208,12 @@ impl<'a, M: Model, const FMA: bool> ShapeFit<'a, M, FMA> {
     }
 
     #[inline(always)]
-    fn shape_bounds() -> (Lane<FMA>, Lane<FMA>) {
+    fn shape_bounds() -> (Lane<ISA>, Lane<ISA>) {
         (Lane::splat(M::SHAPE[0].lower.ln()), Lane::splat(M::SHAPE[0].upper.ln()))
     }
 
     #[inline(always)]
-    pub fn at_bound(&self, point: &Tilts<FMA>) -> LaneMask {
+    pub fn at_bound(&self, point: &Tilts<ISA>) -> LaneMask {
         let (lower, upper) = Self::shape_bounds();
         let range = Lane::splat(VIEW_RANGE * 0.999);
         !point.shape_log.gt(lower)
@@ -235,19 +235,19 @@ fn sine_cosine<R: Real>(angle: R) -> (R, R) {
     (angle * sine, cosine)
 }
 
-impl<M: Model, const FMA: bool> Objective<FMA, 3> for ShapeFit<'_, M, FMA> {
-    type Point = Tilts<FMA>;
+impl<M: Model, const ISA: Isa> Objective<ISA, 3> for ShapeFit<'_, M, ISA> {
+    type Point = Tilts<ISA>;
 
     #[inline(always)]
-    fn quadratic(&mut self, point: &Tilts<FMA>) -> Quadratic<FMA, 3> {
-        outlined::<FMA, _>(
+    fn quadratic(&mut self, point: &Tilts<ISA>) -> Quadratic<ISA, 3> {
+        outlined::<ISA, _>(
             #[inline(always)]
             || self.quadratic_inline(point),
         )
     }
 
     #[inline(always)]
-    fn moved(&self, point: &Tilts<FMA>, step: &[Lane<FMA>; 3]) -> Tilts<FMA> {
+    fn moved(&self, point: &Tilts<ISA>, step: &[Lane<ISA>; 3]) -> Tilts<ISA> {
         let (lower, upper) = Self::shape_bounds();
         let (turn, stretch) = (Lane::splat(0.1), Lane::splat(1.2));
         let range = Lane::splat(VIEW_RANGE);
@@ -262,7 +262,7 @@ impl<M: Model, const FMA: bool> Objective<FMA, 3> for ShapeFit<'_, M, FMA> {
     }
 
     #[inline(always)]
-    fn blocked(&self, point: &Tilts<FMA>, descent: &[Lane<FMA>; 3]) -> [LaneMask; 3] {
+    fn blocked(&self, point: &Tilts<ISA>, descent: &[Lane<ISA>; 3]) -> [LaneMask; 3] {
         let zero = Lane::splat(0.0);
         let (lower, upper) = Self::shape_bounds();
         let range = Lane::splat(VIEW_RANGE);
@@ -276,7 +276,7 @@ impl<M: Model, const FMA: bool> Objective<FMA, 3> for ShapeFit<'_, M, FMA> {
     }
 
     #[inline(always)]
-    fn select(mask: LaneMask, yes: &Tilts<FMA>, no: &Tilts<FMA>) -> Tilts<FMA> {
+    fn select(mask: LaneMask, yes: &Tilts<ISA>, no: &Tilts<ISA>) -> Tilts<ISA> {
         Tilts {
             view: Lane::select(mask, yes.view, no.view),
             shape_log: Lane::select(mask, yes.shape_log, no.shape_log),

@@ -99,10 +99,16 @@ fn models(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
         .collect()
 }
 
-/// Whether the version for AVX2 and FMA runs on this processor.
+/// The names of the instructions that this processor has, the best last.
 #[pyfunction]
-fn fast_instructions() -> bool {
-    dispatch::fast_instructions()
+fn available_instructions() -> Vec<&'static str> {
+    dispatch::available_instructions()
+}
+
+/// The name of those that the fit and the renderer run with.
+#[pyfunction]
+fn instructions() -> &'static str {
+    dispatch::instruction_name(dispatch::instructions())
 }
 
 /// Fits a model to every pixel of a tile; see `impasto.fit`. `paper` is (threshold in radians, As of the sample, refined, direction of the sample's peak or None for each pixel's own)
@@ -307,7 +313,7 @@ fn basis<'py>(
     let vector = |rows: &PyReadonlyArray2<f64>, row: usize| std::array::from_fn(|i| rows.as_array()[[row, i]]);
     let mut values = Vec::new();
     for row in 0..rows {
-        let at = Illumination::new(vector(&light, row), vector(&view, row));
+        let at = Illumination::new(vector(&light, row), vector(&view, row), optics.index);
         let shape: Vec<f64> = shape.as_array().row(row).to_vec();
         values.extend(dispatch::basis(name, vector(&normal, row), &shape, &at, &optics).expect("parsed from the list"));
     }
@@ -318,5 +324,5 @@ fn basis<'py>(
 #[pymodule]
 mod _core {
     #[pymodule_export]
-    use super::{basis, fast_instructions, fit, models, render};
+    use super::{available_instructions, basis, fit, instructions, models, render};
 }

@@ -1,7 +1,7 @@
 //! Rendering: the radiance that fitted parameters give under any lights.
 
 use crate::geometry::{Illumination, Place};
-use crate::lanes::{LANES, Lane};
+use crate::lanes::{Isa, LANES, Lane};
 use crate::models::{MAX_SHAPE, Model, Optics};
 use crate::number::{Number, array};
 
@@ -32,7 +32,7 @@ pub struct View<'a> {
 
 /// Renders pixels `first..first + LANES` into `radiance`, shape (pixel, channel). Missing parameters give missing radiance.
 #[inline(always)]
-pub fn render_group<M: Model, const FMA: bool>(
+pub fn render_group<M: Model, const ISA: Isa>(
     parameters: &Parameters,
     view: &View,
     optics: &Optics,
@@ -40,7 +40,7 @@ pub fn render_group<M: Model, const FMA: bool>(
     radiance: &mut [f32],
 ) {
     let pixel: [usize; LANES] = array!(|i| (first + i).min(parameters.pixels - 1));
-    let column = |map: &[f32], width: usize, index: usize| Lane::<FMA>(array!(|i| map[pixel[i] * width + index]));
+    let column = |map: &[f32], width: usize, index: usize| Lane::<ISA>(array!(|i| map[pixel[i] * width + index]));
     let channels = view.intensity.len();
     let (mut x_mm, mut y_mm) = (Lane::splat(0.0), Lane::splat(0.0));
     if let (true, Some(position)) = (view.light.near() || view.camera.near(), view.position_mm) {
@@ -52,7 +52,7 @@ pub fn render_group<M: Model, const FMA: bool>(
         let tilt = column(parameters.view_tilt, 1, 0).0;
         towards_camera = [Lane(tilt.map(f32::sin)), Lane::splat(0.0), Lane(tilt.map(f32::cos))];
     }
-    let at = Illumination::new(direction, towards_camera);
+    let at = Illumination::new(direction, towards_camera, optics.index);
     let normal = array!(|i| column(parameters.normal, 3, i));
     let mut shape = [Lane::splat(1.0); MAX_SHAPE];
     for (i, value) in shape.iter_mut().enumerate().take(M::SHAPE.len()) {

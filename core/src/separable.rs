@@ -7,7 +7,7 @@
 use crate::arrow::{Arrow, Factored, Magnitudes};
 use crate::dual::Dual;
 use crate::geometry::{Illumination, normalise, tangents};
-use crate::lanes::{Lane, LaneMask, outlined};
+use crate::lanes::{Isa, Lane, LaneMask, outlined};
 use crate::minimise::{Objective, Quadratic};
 use crate::models::{Basis, MAX_LOBES, MAX_SHAPE, Model, Optics};
 use crate::number::{Mask, Number, Real, array};
@@ -34,44 +34,44 @@ pub enum Loss {
 
 /// Normal and logarithms of the shape parameters.
 #[derive(Clone, Copy)]
-pub struct Point<const FMA: bool> {
-    pub normal: [Lane<FMA>; 3],
-    pub shape_log: [Lane<FMA>; MAX_SHAPE],
+pub struct Point<const ISA: Isa> {
+    pub normal: [Lane<ISA>; 3],
+    pub shape_log: [Lane<ISA>; MAX_SHAPE],
 }
 
 /// P is 2 + the number of shape parameters.
-pub struct Separable<'a, M, const FMA: bool, const C: usize, const P: usize> {
-    pub observations: &'a [Observation<FMA, C>],
-    pub illuminations: &'a [Illumination<Lane<FMA>>],
-    colour: [Lane<FMA>; C],
+pub struct Separable<'a, M, const ISA: Isa, const C: usize, const P: usize> {
+    pub observations: &'a [Observation<ISA, C>],
+    pub illuminations: &'a [Illumination<Lane<ISA>>],
+    colour: [Lane<ISA>; C],
     optics: Optics,
     loss: Loss,
     pub ambient: bool,
     pub channels: usize,
     /// Specular magnitude where it is known beforehand, as one value for a whole sample.
-    pub fixed_specular: Option<[Lane<FMA>; MAX_LOBES]>,
+    pub fixed_specular: Option<[Lane<ISA>; MAX_LOBES]>,
     /// Whether weak priors stand in for highlights that no light has shown.
     pub prior: bool,
     /// 1 / degrees of freedom.
-    per_freedom: Lane<FMA>,
+    per_freedom: Lane<ISA>,
     /// χ² per degree of freedom at the accepted point and at the one looked at last: the scale of the noise.
-    noise_scale: Lane<FMA>,
-    trial_noise_scale: Lane<FMA>,
+    noise_scale: Lane<ISA>,
+    trial_noise_scale: Lane<ISA>,
     /// The loss takes residuals this many times larger for noise.
-    loss_scale: Lane<FMA>,
+    loss_scale: Lane<ISA>,
     /// Factor of each sample's weight from the robust loss, refreshed at every accepted point.
-    robust: Vec<[Lane<FMA>; C]>,
-    basis: Vec<Basis<Dual<Lane<FMA>, P>>>,
+    robust: Vec<[Lane<ISA>; C]>,
+    basis: Vec<Basis<Dual<Lane<ISA>, P>>>,
     model: PhantomData<M>,
 }
 
 /// Buffers with one entry per light, handed from group to group.
-pub struct Scratch<const FMA: bool, const C: usize, const P: usize> {
-    robust: Vec<[Lane<FMA>; C]>,
-    basis: Vec<Basis<Dual<Lane<FMA>, P>>>,
+pub struct Scratch<const ISA: Isa, const C: usize, const P: usize> {
+    robust: Vec<[Lane<ISA>; C]>,
+    basis: Vec<Basis<Dual<Lane<ISA>, P>>>,
 }
 
-impl<const FMA: bool, const C: usize, const P: usize> Scratch<FMA, C, P> {
+impl<const ISA: Isa, const C: usize, const P: usize> Scratch<ISA, C, P> {
     pub fn new(lights: usize) -> Self {
         let zero = Dual::constant(Lane::splat(0.0));
         Scratch {
@@ -82,17 +82,17 @@ impl<const FMA: bool, const C: usize, const P: usize> Scratch<FMA, C, P> {
 }
 
 /// A point's magnitudes and everything that uncertainties are made from.
-pub struct Solution<const FMA: bool, const C: usize, const P: usize> {
-    pub quadratic: Quadratic<FMA, P>,
-    pub magnitudes: Magnitudes<FMA, C>,
-    pub factored: Factored<FMA, C>,
+pub struct Solution<const ISA: Isa, const C: usize, const P: usize> {
+    pub quadratic: Quadratic<ISA, P>,
+    pub magnitudes: Magnitudes<ISA, C>,
+    pub factored: Factored<ISA, C>,
     /// For each nonlinear parameter, how the magnitudes follow it: −∂(magnitudes)/∂(parameter).
-    pub following: [Magnitudes<FMA, C>; P],
+    pub following: [Magnitudes<ISA, C>; P],
 }
 
 /// sᵀ Σ s: the variance of a quantity with slopes s along parameters of covariance Σ.
 #[inline(always)]
-fn propagated<const FMA: bool, const P: usize>(slopes: [Lane<FMA>; P], covariance: &[[Lane<FMA>; P]; P]) -> Lane<FMA> {
+fn propagated<const ISA: Isa, const P: usize>(slopes: [Lane<ISA>; P], covariance: &[[Lane<ISA>; P]; P]) -> Lane<ISA> {
     let mut sum = Lane::splat(0.0);
     for p in 0..P {
         for q in 0..P {
@@ -102,11 +102,11 @@ fn propagated<const FMA: bool, const P: usize>(slopes: [Lane<FMA>; P], covarianc
     sum
 }
 
-impl<const FMA: bool, const C: usize, const P: usize> Solution<FMA, C, P> {
+impl<const ISA: Isa, const C: usize, const P: usize> Solution<ISA, C, P> {
     /// Marginal variances of the magnitudes, from the covariance of the nonlinear parameters: those of the linear problem
     /// at a known normal and shape, plus what follows from not knowing these.
     #[inline(always)]
-    pub fn magnitude_variances(&self, lobes: usize, covariance: &[[Lane<FMA>; P]; P]) -> Magnitudes<FMA, C> {
+    pub fn magnitude_variances(&self, lobes: usize, covariance: &[[Lane<ISA>; P]; P]) -> Magnitudes<ISA, C> {
         let one = Lane::splat(1.0);
         let mut variances = Magnitudes::zero();
         for k in 0..C {
@@ -131,16 +131,16 @@ impl<const FMA: bool, const C: usize, const P: usize> Solution<FMA, C, P> {
     }
 }
 
-impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a, M, FMA, C, P> {
+impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a, M, ISA, C, P> {
     /// The problem of one group, with buffers that `give_back` returns.
     #[inline(always)]
     pub fn new(
-        group: &'a Group<FMA, C>,
-        colour: [Lane<FMA>; C],
+        group: &'a Group<ISA, C>,
+        colour: [Lane<ISA>; C],
         optics: Optics,
         loss: Loss,
         ambient: bool,
-        scratch: &mut Scratch<FMA, C, P>,
+        scratch: &mut Scratch<ISA, C, P>,
     ) -> Self {
         let unknowns = P + M::LOBES + group.channels * (1 + usize::from(ambient));
         let freedom = group.usable_samples - Lane::splat(unknowns as f64);
@@ -170,7 +170,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
 
     /// Returns the buffers for the next group.
     #[inline(always)]
-    pub fn give_back(self, scratch: &mut Scratch<FMA, C, P>) {
+    pub fn give_back(self, scratch: &mut Scratch<ISA, C, P>) {
         (scratch.robust, scratch.basis) = (self.robust, self.basis);
     }
 
@@ -180,7 +180,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
     }
 
     #[inline(always)]
-    fn weight(&self, light: usize) -> [Lane<FMA>; C] {
+    fn weight(&self, light: usize) -> [Lane<ISA>; C] {
         let weight = self.observations[light].weight;
         if self.loss == Loss::Linear {
             return weight;
@@ -190,7 +190,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
 
     /// The basis functions at a point, with their derivatives by (tangent, tangent, ln shape …).
     #[inline(always)]
-    fn evaluate_basis(&mut self, point: &Point<FMA>) {
+    fn evaluate_basis(&mut self, point: &Point<ISA>) {
         let (first, second) = tangents(point.normal);
         let normal = array!(|i| {
             let mut component = Dual::constant(point.normal[i]);
@@ -209,7 +209,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
     }
 
     #[inline(always)]
-    fn lobe_sum(&self, magnitudes: &Magnitudes<FMA, C>, light: usize) -> Dual<Lane<FMA>, P> {
+    fn lobe_sum(&self, magnitudes: &Magnitudes<ISA, C>, light: usize) -> Dual<Lane<ISA>, P> {
         let mut sum = Dual::constant(Lane::splat(0.0));
         for j in 0..M::LOBES {
             sum = self.basis[light].specular[j].scale_add(magnitudes.specular[j], sum);
@@ -219,15 +219,15 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
 
     /// Solves for the magnitudes at a point, then takes the cost and its derivatives there.
     #[inline(always)]
-    pub fn solve(&mut self, point: &Point<FMA>) -> Solution<FMA, C, P> {
-        outlined::<FMA, _>(
+    pub fn solve(&mut self, point: &Point<ISA>) -> Solution<ISA, C, P> {
+        outlined::<ISA, _>(
             #[inline(always)]
             || self.solve_inline(point),
         )
     }
 
     #[inline(always)]
-    fn solve_inline(&mut self, point: &Point<FMA>) -> Solution<FMA, C, P> {
+    fn solve_inline(&mut self, point: &Point<ISA>) -> Solution<ISA, C, P> {
         self.evaluate_basis(point);
         let zero = Lane::splat(0.0);
         let lobes = self.free_lobes();
@@ -339,7 +339,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
     }
 
     #[inline(always)]
-    fn specular_scale(&self, point: &Point<FMA>) -> Dual<Lane<FMA>, P> {
+    fn specular_scale(&self, point: &Point<ISA>) -> Dual<Lane<ISA>, P> {
         let mut shape = [Dual::constant(Lane::splat(0.0)); MAX_SHAPE];
         for i in 0..P - 2 {
             let value = point.shape_log[i].exp();
@@ -354,7 +354,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
     /// The noise is known only roughly, so its scale is taken from the residuals: to minimise n ln χ² + p, the log posterior
     /// of n degrees of freedom under a prior −p/2, is to minimise χ² (1 + p/n) near the minimum.
     #[inline(always)]
-    fn add_shape_prior(&self, point: &Point<FMA>, quadratic: &mut Quadratic<FMA, P>) {
+    fn add_shape_prior(&self, point: &Point<ISA>, quadratic: &mut Quadratic<ISA, P>) {
         for i in 0..P - 2 {
             let (median, deviation) = M::SHAPE[i].prior;
             let weight = self.trial_noise_scale * Lane::splat(1.0 / (deviation * deviation));
@@ -367,7 +367,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
 
     /// ρ of a residual; `weight` includes the robust factor, `plain` does not.
     #[inline(always)]
-    fn cost_of(&self, weight: Lane<FMA>, plain: Lane<FMA>, residual: Lane<FMA>) -> Lane<FMA> {
+    fn cost_of(&self, weight: Lane<ISA>, plain: Lane<ISA>, residual: Lane<ISA>) -> Lane<ISA> {
         match self.loss {
             Loss::Linear => weight * residual * residual,
             Loss::Cauchy(k) => {
@@ -386,7 +386,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
 
     /// The radiance that the model gives at a light, per unit of irradiance.
     #[inline(always)]
-    pub fn predicted(&self, magnitudes: &Magnitudes<FMA, C>, light: usize) -> [Lane<FMA>; C] {
+    pub fn predicted(&self, magnitudes: &Magnitudes<ISA, C>, light: usize) -> [Lane<ISA>; C] {
         let sum = self.lobe_sum(magnitudes, light).value;
         array!(|k| {
             let diffuse = magnitudes.diffuse[k].mul_add(self.basis[light].diffuse.value, magnitudes.ambient[k]);
@@ -396,7 +396,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
 
     /// Robust factors from the residuals at a point: iteratively reweighted least squares.
     #[inline(always)]
-    fn reweight(&mut self, magnitudes: &Magnitudes<FMA, C>, mask: LaneMask) {
+    fn reweight(&mut self, magnitudes: &Magnitudes<ISA, C>, mask: LaneMask) {
         let one = Lane::splat(1.0);
         let scale_squared = self.loss_scale * self.loss_scale;
         for (light, observation) in self.observations.iter().enumerate() {
@@ -416,7 +416,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
 
     /// Gives the samples of each light only a share of their weight, until the loss has residuals to go by.
     #[inline(always)]
-    pub fn trust(&mut self, share: &[Lane<FMA>]) {
+    pub fn trust(&mut self, share: &[Lane<ISA>]) {
         for (robust, share) in self.robust.iter_mut().zip(share) {
             *robust = [*share; C];
         }
@@ -424,7 +424,7 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
 
     /// Sets the scale of the loss to the residuals' own at a point, by the samples that are trusted there, or back to 1.
     #[inline(always)]
-    pub fn scale_loss(&mut self, point: Option<&Point<FMA>>) {
+    pub fn scale_loss(&mut self, point: Option<&Point<ISA>>) {
         let one = Lane::splat(1.0);
         self.loss_scale = one;
         let Some(point) = point else { return };
@@ -443,14 +443,14 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
     }
 
     #[inline(always)]
-    fn shape_bounds(index: usize) -> (Lane<FMA>, Lane<FMA>) {
+    fn shape_bounds(index: usize) -> (Lane<ISA>, Lane<ISA>) {
         let parameter = M::SHAPE[index];
         (Lane::splat(parameter.lower.ln()), Lane::splat(parameter.upper.ln()))
     }
 
     /// Lanes with a parameter or a magnitude at its bound.
     #[inline(always)]
-    pub fn at_bound(&self, point: &Point<FMA>, magnitudes: &Magnitudes<FMA, C>) -> LaneMask {
+    pub fn at_bound(&self, point: &Point<ISA>, magnitudes: &Magnitudes<ISA, C>) -> LaneMask {
         let zero = Lane::splat(0.0);
         let mut bound = !point.normal[2].gt(Lane::splat(NORMAL_Z_MIN * 1.001));
         for i in 0..P - 2 {
@@ -467,20 +467,20 @@ impl<'a, M: Model, const FMA: bool, const C: usize, const P: usize> Separable<'a
     }
 }
 
-impl<M: Model, const FMA: bool, const C: usize, const P: usize> Objective<FMA, P> for Separable<'_, M, FMA, C, P> {
-    type Point = Point<FMA>;
+impl<M: Model, const ISA: Isa, const C: usize, const P: usize> Objective<ISA, P> for Separable<'_, M, ISA, C, P> {
+    type Point = Point<ISA>;
 
     #[inline(always)]
-    fn quadratic(&mut self, point: &Point<FMA>) -> Quadratic<FMA, P> {
+    fn quadratic(&mut self, point: &Point<ISA>) -> Quadratic<ISA, P> {
         self.solve(point).quadratic
     }
 
     #[inline(always)]
-    fn moved(&self, point: &Point<FMA>, step: &[Lane<FMA>; P]) -> Point<FMA> {
+    fn moved(&self, point: &Point<ISA>, step: &[Lane<ISA>; P]) -> Point<ISA> {
         let length = (step[0] * step[0] + step[1] * step[1]).sqrt().max(Lane::splat(1e-20));
         let shorten = (Lane::splat(TURN_MAX) / length).min(Lane::splat(1.0));
         let (first, second) = tangents(point.normal);
-        let mut turned: [Lane<FMA>; 3] =
+        let mut turned: [Lane<ISA>; 3] =
             array!(|i| point.normal[i] + shorten * (step[0] * first[i] + step[1] * second[i]));
         turned[2] = turned[2].max(Lane::splat(NORMAL_Z_MIN));
         let mut shape_log = point.shape_log;
@@ -494,7 +494,7 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize> Objective<FMA, P
     }
 
     #[inline(always)]
-    fn blocked(&self, point: &Point<FMA>, descent: &[Lane<FMA>; P]) -> [LaneMask; P] {
+    fn blocked(&self, point: &Point<ISA>, descent: &[Lane<ISA>; P]) -> [LaneMask; P] {
         let zero = Lane::splat(0.0);
         let mut blocked = [LaneMask::NONE; P];
         for i in 0..P - 2 {
@@ -507,7 +507,7 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize> Objective<FMA, P
     }
 
     #[inline(always)]
-    fn select(mask: LaneMask, yes: &Point<FMA>, no: &Point<FMA>) -> Point<FMA> {
+    fn select(mask: LaneMask, yes: &Point<ISA>, no: &Point<ISA>) -> Point<ISA> {
         Point {
             normal: array!(|i| Lane::select(mask, yes.normal[i], no.normal[i])),
             shape_log: array!(|i| Lane::select(mask, yes.shape_log[i], no.shape_log[i])),
@@ -515,7 +515,7 @@ impl<M: Model, const FMA: bool, const C: usize, const P: usize> Objective<FMA, P
     }
 
     #[inline(always)]
-    fn accepted(&mut self, point: &Point<FMA>, mask: LaneMask) {
+    fn accepted(&mut self, point: &Point<ISA>, mask: LaneMask) {
         self.noise_scale = Lane::select(mask, self.trial_noise_scale, self.noise_scale);
         if self.loss != Loss::Linear && mask.any() {
             let magnitudes = self.solve(point).magnitudes;

@@ -2,7 +2,7 @@
 
 use crate::arrow::Arrow;
 use crate::geometry::{Illumination, chord_squared, dot, normalise};
-use crate::lanes::{Lane, outlined};
+use crate::lanes::{Isa, Lane, outlined};
 use crate::minimise::solve_symmetric;
 use crate::models::{MAX_SHAPE, MAX_STARTS, Model, Optics};
 use crate::number::{Number, Real, array};
@@ -11,13 +11,13 @@ use crate::separable::{NORMAL_Z_MIN, Point};
 
 /// Mean over the channels of one light's samples, and the weight of that mean.
 #[derive(Clone, Copy)]
-pub struct Grey<const FMA: bool> {
-    pub radiance: Lane<FMA>,
-    pub weight: Lane<FMA>,
+pub struct Grey<const ISA: Isa> {
+    pub radiance: Lane<ISA>,
+    pub weight: Lane<ISA>,
 }
 
 #[inline(always)]
-pub fn grey<const FMA: bool, const C: usize>(group: &Group<FMA, C>, into: &mut Vec<Grey<FMA>>) {
+pub fn grey<const ISA: Isa, const C: usize>(group: &Group<ISA, C>, into: &mut Vec<Grey<ISA>>) {
     into.clear();
     let share = Lane::splat(1.0 / group.channels as f64);
     for observation in &group.observations {
@@ -33,16 +33,16 @@ pub fn grey<const FMA: bool, const C: usize>(group: &Group<FMA, C>, into: &mut V
 }
 
 #[inline(always)]
-fn bounded<const FMA: bool>(vector: [Lane<FMA>; 3]) -> [Lane<FMA>; 3] {
+fn bounded<const ISA: Isa>(vector: [Lane<ISA>; 3]) -> [Lane<ISA>; 3] {
     let length = dot(vector, vector).sqrt().max(Lane::splat(1e-20));
-    let unit: [Lane<FMA>; 3] = array!(|i| vector[i] / length);
+    let unit: [Lane<ISA>; 3] = array!(|i| vector[i] / length);
     normalise([unit[0], unit[1], unit[2].max(Lane::splat(NORMAL_Z_MIN))])
 }
 
 /// The centroid of the half vectors, weighted by radiance to the fourth power: where the highlight is. Clipped samples
 /// count, for they are its brightest.
 #[inline(always)]
-fn highlight_normal<const FMA: bool>(grey: &[Grey<FMA>], illuminations: &[Illumination<Lane<FMA>>]) -> [Lane<FMA>; 3] {
+fn highlight_normal<const ISA: Isa>(grey: &[Grey<ISA>], illuminations: &[Illumination<Lane<ISA>>]) -> [Lane<ISA>; 3] {
     let mut brightest = Lane::splat(1e-20);
     for sample in grey {
         brightest = brightest.max(sample.radiance);
@@ -61,11 +61,11 @@ fn highlight_normal<const FMA: bool>(grey: &[Grey<FMA>], illuminations: &[Illumi
 /// Lambert's normal by linear least squares over samples away from the highlight that `previous` would have, in Cauchy's
 /// norm, so that shadows and what is left of the highlight do not pull. The normal is multiplied by the albedo.
 #[inline(always)]
-fn scaled_normal<const FMA: bool>(
-    grey: &[Grey<FMA>],
-    illuminations: &[Illumination<Lane<FMA>>],
+fn scaled_normal<const ISA: Isa>(
+    grey: &[Grey<ISA>],
+    illuminations: &[Illumination<Lane<ISA>>],
     rounds: usize,
-) -> [Lane<FMA>; 3] {
+) -> [Lane<ISA>; 3] {
     let zero = Lane::splat(0.0);
     let mut scaled_normal = [zero, zero, zero];
     let mut normal = [zero, zero, Lane::splat(1.0)];
@@ -105,21 +105,21 @@ fn scaled_normal<const FMA: bool>(
 
 /// Lambert's normal by `rounds` of reweighted linear least squares.
 #[inline(always)]
-pub fn diffuse_normal<const FMA: bool>(
-    grey: &[Grey<FMA>],
-    illuminations: &[Illumination<Lane<FMA>>],
+pub fn diffuse_normal<const ISA: Isa>(
+    grey: &[Grey<ISA>],
+    illuminations: &[Illumination<Lane<ISA>>],
     rounds: usize,
-) -> [Lane<FMA>; 3] {
+) -> [Lane<ISA>; 3] {
     bounded(scaled_normal(grey, illuminations, rounds))
 }
 
 /// Takes weight from samples that are darker than the diffuse light around them explains: cast shadows. A robust loss would
 /// find them too, but not from a start that they have spoilt. Returns the share of weight that each light keeps.
 #[inline(always)]
-pub fn doubt_shadows<const FMA: bool>(
-    grey: &mut [Grey<FMA>],
-    illuminations: &[Illumination<Lane<FMA>>],
-    kept: &mut Vec<Lane<FMA>>,
+pub fn doubt_shadows<const ISA: Isa>(
+    grey: &mut [Grey<ISA>],
+    illuminations: &[Illumination<Lane<ISA>>],
+    kept: &mut Vec<Lane<ISA>>,
 ) {
     let zero = Lane::splat(0.0);
     let scaled = scaled_normal(grey, illuminations, 8);
@@ -136,25 +136,25 @@ pub fn doubt_shadows<const FMA: bool>(
 
 /// Two normals that the fit may start from: where the diffuse light puts it, and where the highlight does.
 #[inline(always)]
-pub fn candidates<const FMA: bool>(
-    grey: &[Grey<FMA>],
-    illuminations: &[Illumination<Lane<FMA>>],
-) -> [[Lane<FMA>; 3]; 2] {
+pub fn candidates<const ISA: Isa>(
+    grey: &[Grey<ISA>],
+    illuminations: &[Illumination<Lane<ISA>>],
+) -> [[Lane<ISA>; 3]; 2] {
     [diffuse_normal(grey, illuminations, 3), highlight_normal(grey, illuminations)]
 }
 
 /// The best shape of the model's grid at the best of the candidate normals.
 #[inline(always)]
-pub fn start<M: Model, const FMA: bool>(
-    candidates: &[[Lane<FMA>; 3]],
-    grey: &[Grey<FMA>],
-    illuminations: &[Illumination<Lane<FMA>>],
+pub fn start<M: Model, const ISA: Isa>(
+    candidates: &[[Lane<ISA>; 3]],
+    grey: &[Grey<ISA>],
+    illuminations: &[Illumination<Lane<ISA>>],
     optics: &Optics,
     ambient: bool,
-) -> Point<FMA> {
-    outlined::<FMA, _>(
+) -> Point<ISA> {
+    outlined::<ISA, _>(
         #[inline(always)]
-        || start_inline::<M, FMA>(candidates, grey, illuminations, optics, ambient),
+        || start_inline::<M, ISA>(candidates, grey, illuminations, optics, ambient),
     )
 }
 
@@ -163,28 +163,28 @@ pub fn start<M: Model, const FMA: bool>(
 /// To leave the diffuse normal b free costs nothing, for it is linear, and it keeps a broad lobe apart from a tilt of the
 /// diffuse term that a candidate normal slightly off would otherwise pay for with a negative lobe.
 #[derive(Clone, Copy)]
-struct FreeDiffuse<const FMA: bool> {
+struct FreeDiffuse<const ISA: Isa> {
     /// Of (l, 1) with itself; the row of 1 is 0 without ambient term.
-    matrix: [[Lane<FMA>; 4]; 4],
-    right: [Lane<FMA>; 4],
-    data: Lane<FMA>,
+    matrix: [[Lane<ISA>; 4]; 4],
+    right: [Lane<ISA>; 4],
+    data: Lane<ISA>,
 }
 
 #[derive(Clone, Copy)]
-struct LobeSums<const FMA: bool> {
-    cross: [Lane<FMA>; 4],
-    square: Lane<FMA>,
-    right: Lane<FMA>,
+struct LobeSums<const ISA: Isa> {
+    cross: [Lane<ISA>; 4],
+    square: Lane<ISA>,
+    right: Lane<ISA>,
 }
 
 #[inline(always)]
-fn start_inline<M: Model, const FMA: bool>(
-    candidates: &[[Lane<FMA>; 3]],
-    grey: &[Grey<FMA>],
-    illuminations: &[Illumination<Lane<FMA>>],
+fn start_inline<M: Model, const ISA: Isa>(
+    candidates: &[[Lane<ISA>; 3]],
+    grey: &[Grey<ISA>],
+    illuminations: &[Illumination<Lane<ISA>>],
     optics: &Optics,
     ambient: bool,
-) -> Point<FMA> {
+) -> Point<ISA> {
     let zero = Lane::splat(0.0);
     let one = Lane::splat(if ambient { 1.0 } else { 0.0 });
     let mut best_cost = Lane::splat(f64::from(f32::MAX));
@@ -197,7 +197,7 @@ fn start_inline<M: Model, const FMA: bool>(
             sums.data = (sample.weight * sample.radiance).mul_add(sample.radiance, sums.data);
             let weight = Lane::select(dot(normal, at.light).positive(), sample.weight, zero);
             let column = [at.light[0], at.light[1], at.light[2], one];
-            let weighted: [Lane<FMA>; 4] = array!(|i| weight * column[i]);
+            let weighted: [Lane<ISA>; 4] = array!(|i| weight * column[i]);
             for i in 0..4 {
                 sums.right[i] = weighted[i].mul_add(sample.radiance, sums.right[i]);
                 for j in i..4 {
@@ -206,7 +206,7 @@ fn start_inline<M: Model, const FMA: bool>(
             }
             // The inner loop is over the shapes, so that what depends on the directions alone is computed once.
             for (lobe, shape) in lobes.iter_mut().zip(M::STARTS) {
-                let shape: [Lane<FMA>; MAX_SHAPE] = array!(|i| Lane::splat(shape[i]));
+                let shape: [Lane<ISA>; MAX_SHAPE] = array!(|i| Lane::splat(shape[i]));
                 let value = M::basis(normal, &shape[..M::SHAPE.len()], at, optics).specular[0];
                 for i in 0..4 {
                     lobe.cross[i] = weighted[i].mul_add(value, lobe.cross[i]);
@@ -243,8 +243,8 @@ fn start_inline<M: Model, const FMA: bool>(
     // The lobe's normal or the diffuse term's: whichever serves both better.
     let free_normal = bounded(free_normal);
     let costs = [
-        one_normal_cost::<M, FMA>(best.normal, &best.shape_log, grey, illuminations, optics, ambient),
-        one_normal_cost::<M, FMA>(free_normal, &best.shape_log, grey, illuminations, optics, ambient),
+        one_normal_cost::<M, ISA>(best.normal, &best.shape_log, grey, illuminations, optics, ambient),
+        one_normal_cost::<M, ISA>(free_normal, &best.shape_log, grey, illuminations, optics, ambient),
     ];
     let better = costs[1].lt(costs[0]);
     best.normal = array!(|i| Lane::select(better, free_normal[i], best.normal[i]));
@@ -252,7 +252,7 @@ fn start_inline<M: Model, const FMA: bool>(
 }
 
 #[inline(always)]
-fn product<const FMA: bool, const N: usize>(a: &[Lane<FMA>; N], b: &[Lane<FMA>; N]) -> Lane<FMA> {
+fn product<const ISA: Isa, const N: usize>(a: &[Lane<ISA>; N], b: &[Lane<ISA>; N]) -> Lane<ISA> {
     let mut sum = Lane::splat(0.0);
     for i in 0..N {
         sum = a[i].mul_add(b[i], sum);
@@ -262,17 +262,17 @@ fn product<const FMA: bool, const N: usize>(a: &[Lane<FMA>; N], b: &[Lane<FMA>; 
 
 /// Least cost of a normal and a shape over all magnitudes that are not negative.
 #[inline(always)]
-fn one_normal_cost<M: Model, const FMA: bool>(
-    normal: [Lane<FMA>; 3],
-    shape_log: &[Lane<FMA>; MAX_SHAPE],
-    grey: &[Grey<FMA>],
-    illuminations: &[Illumination<Lane<FMA>>],
+fn one_normal_cost<M: Model, const ISA: Isa>(
+    normal: [Lane<ISA>; 3],
+    shape_log: &[Lane<ISA>; MAX_SHAPE],
+    grey: &[Grey<ISA>],
+    illuminations: &[Illumination<Lane<ISA>>],
     optics: &Optics,
     ambient: bool,
-) -> Lane<FMA> {
+) -> Lane<ISA> {
     let one = [Lane::splat(1.0)];
-    let shape: [Lane<FMA>; MAX_SHAPE] = array!(|i| shape_log[i].exp());
-    let mut arrow = Arrow::<FMA, 1>::new(ambient);
+    let shape: [Lane<ISA>; MAX_SHAPE] = array!(|i| shape_log[i].exp());
+    let mut arrow = Arrow::<ISA, 1>::new(ambient);
     let mut data = Lane::splat(0.0);
     for (sample, at) in grey.iter().zip(illuminations) {
         let (radiance, weight) = ([sample.radiance], [sample.weight]);

@@ -4,7 +4,7 @@
 use super::{FresnelAngle, MAX_SHAPE, Model, Optics};
 use crate::dual::Dual;
 use crate::geometry::{Illumination, normalise};
-use crate::lanes::{LANES, Lane};
+use crate::lanes::{LANES, Lane, PLAIN};
 use crate::number::Number;
 use serde_json::Value;
 
@@ -56,13 +56,13 @@ fn check_values<M: Model>(name: &str) {
     assert!(cases.len() >= 10, "{name} has {} golden cases", cases.len());
     for case in cases {
         let shape = &case.shape[..M::SHAPE.len()];
-        let at = Illumination::new(case.light, case.view);
+        let at = Illumination::new(case.light, case.view, case.optics.index);
         let exact = M::basis(case.normal, shape, &at, &case.optics);
         assert_close(exact.diffuse, case.diffuse, 1e-5, name);
         assert_close(exact.specular[0], case.specular, 1e-5, name);
 
-        let lanes = |vector: [f64; 3]| vector.map(Lane::<false>::splat);
-        let at = Illumination::new(lanes(case.light), lanes(case.view));
+        let lanes = |vector: [f64; 3]| vector.map(Lane::<PLAIN>::splat);
+        let at = Illumination::new(lanes(case.light), lanes(case.view), case.optics.index);
         let shape: Vec<_> = shape.iter().map(|&value| Lane::splat(value)).collect();
         let single = M::basis(lanes(case.normal), &shape, &at, &case.optics);
         // Directions rounded to f32 move a lobe of width c by 1e-7 / c of it; an exponent of Phong multiplies them likewise.
@@ -75,7 +75,7 @@ fn check_values<M: Model>(name: &str) {
 /// the edge of what is lit lies within the difference.
 fn check_derivatives<M: Model>(name: &str) {
     let optics = Optics { index: 1.5, fresnel: FresnelAngle::Element };
-    let at = Illumination::new(normalise([0.4, 0.1, 0.9]), normalise([-0.2, 0.15, 1.0]));
+    let at = Illumination::new(normalise([0.4, 0.1, 0.9]), normalise([-0.2, 0.15, 1.0]), optics.index);
     let normal = normalise([0.12, 0.03, 1.0]);
     let shape: Vec<f64> = M::SHAPE.iter().map(|parameter| parameter.prior.0).collect();
     let evaluate = |normal: [f64; 3], shape: &[f64]| {

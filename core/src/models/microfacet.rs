@@ -1,4 +1,4 @@
-//! The factors of a microfacet lobe: D, the distribution of facet slopes; F, Fresnel's reflectance; G, shadowing and masking.
+//! Factors of a microfacet lobe: D, the distribution of facet slopes, and G, shadowing and masking.
 
 use super::ShapeParameter;
 use crate::geometry::Illumination;
@@ -106,17 +106,6 @@ fn facet_angle_squared<N: Number>(chord_squared: N) -> N {
     sum * chord_squared
 }
 
-/// Fresnel's reflectance of unpolarised light at a smooth dielectric, exactly ([CookTorrance1982], Eq. 15).
-#[inline(always)]
-pub fn fresnel<N: Number>(cosine: N, index: f64) -> N {
-    let one = N::splat(1.0);
-    let g = cosine.mul_add(cosine, N::splat(index * index - 1.0)).sqrt();
-    let (sum, difference) = (g + cosine, g - cosine);
-    let perpendicular = (difference / sum).squared();
-    let parallel = (cosine.mul_add(sum, -one) / cosine.mul_add(difference, one)).squared();
-    (perpendicular * (one + parallel)).scale(N::Real::splat(0.5))
-}
-
 /// G.
 pub trait Masking {
     const TITLE: &'static str;
@@ -146,7 +135,7 @@ impl Masking for VGroove {
         normal_half: N,
         at: &Illumination<N::Real>,
     ) -> N {
-        let twice = normal_half.scale(N::Real::splat(2.0) / at.light_half);
+        let twice = (normal_half + normal_half).scale(at.per_light_half);
         (twice * normal_light.min(normal_view)).min(N::splat(1.0)) / normal_view
     }
 }

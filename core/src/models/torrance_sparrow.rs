@@ -2,8 +2,9 @@
 //!
 //! F is not normalised: with c = α, As = κ / (4 c²) makes the lobe that of a smooth GGX interface times κ.
 
-use super::microfacet::{Distribution, Masking, fresnel};
+use super::microfacet::{Distribution, Masking};
 use super::{Basis, FresnelAngle, MAX_SHAPE, Model, Optics, ShapeParameter};
+use crate::fresnel::fresnel;
 use crate::geometry::{Illumination, chord_squared, facing};
 use crate::number::Number;
 use std::marker::PhantomData;
@@ -32,7 +33,7 @@ impl<D: Distribution, G: Masking> Model for TorranceSparrow<D, G> {
         let masked = G::over_normal_view(shape[0], normal_light, normal_view, normal_half, at);
         let lobe = D::evaluate(shape[0], chord) * masked;
         let lobe = match optics.fresnel {
-            FresnelAngle::Facet => lobe.scale(fresnel(at.light_half, optics.index)),
+            FresnelAngle::Facet => lobe.scale(at.facet_reflectance),
             FresnelAngle::Element => lobe * fresnel(normal_light, optics.index),
         };
         Basis { diffuse: N::select(visible, normal_light, zero), specular: [N::select(visible, lobe, zero)] }
