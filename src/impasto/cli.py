@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,6 +25,9 @@ from impasto.summaries import (
     simulation_lines,
     stack_lines,
 )
+
+# Parameters of glibc's mallopt.
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 
 app = typer.Typer(
     name="impasto",
@@ -405,4 +410,13 @@ def _pair(text: str, option: str, do: str) -> tuple[int, int]:
 
 def main() -> None:
     """Run the command line."""
+    _keep_freed_memory()
     app()
+
+
+def _keep_freed_memory() -> None:
+    """Let large buffers be used again instead of going back to the system, which clears each page anew."""
+    with suppress(OSError, AttributeError):  # where the C library is not glibc
+        library = ctypes.CDLL(None)
+        for parameter in (_TRIM_THRESHOLD, _MMAP_THRESHOLD):
+            library.mallopt(parameter, 1 << 30)
