@@ -120,7 +120,7 @@ def main() -> int:
         sections = {
             "accuracy": ("Accuracy", lambda: accuracy_rows(200_000 // share)),
             "speed": ("Speed", lambda: speed_rows(200_000 // share, 3000 // share, 2)),
-            "procedures": ("Procedures", lambda: procedure_rows(folder, 1024 if share == 1 else 320)),
+            "procedures": ("Procedures", lambda: procedure_rows(folder, 2048 if share == 1 else 320)),
             "whole": ("From photographs to maps", lambda: whole_rows(folder, sizes)),
         }
         chosen = [arguments.only] if arguments.only else list(sections)

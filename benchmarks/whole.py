@@ -68,6 +68,7 @@ def measure(capture: Capture, store: Path) -> dict[str, Any]:
     compileall.compile_dir(Path(find_spec("impasto").origin).parent, quiet=1)
     floors = {what: _floor(what, capture.folder) for what in ("decode", "memory")}
     fit_alone = floors["memory"]["seconds"] * capture.pixels / floors["memory"]["pixels"]
+    os.sync()  # writing the photographs is not part of the way
     stack = impasto("stack", str(capture.folder), str(store))
     fit = impasto("fit", str(store), "--model", MODEL)
     alone = floors["decode"]["seconds"] + fit_alone
