@@ -95,7 +95,9 @@ def simulate(
     exposure: Annotated[
         float, typer.Option("--exposure", metavar="SHARE", help="Value of white, as share of full scale.")
     ] = 0.25,
-    format: Annotated[str, typer.Option("--format", metavar="KIND", help="tiff, png, jpeg or exr.")] = "tiff",
+    format: Annotated[
+        str, typer.Option("--format", metavar="KIND", help="tiff, png, jpeg, exr or dng.")
+    ] = "tiff",
     bits: Annotated[int | None, typer.Option("--bits", metavar="N", help="8 or 16.")] = None,
     noise: Annotated[bool, typer.Option("--noise/--no-noise", help="Whether the sensor is noisy.")] = True,
     shadows: Annotated[

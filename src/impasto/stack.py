@@ -352,6 +352,11 @@ def _header(capture: Capture, decoding: list[Linearisation]) -> stores.StackHead
                 "exposure_s": photograph.exposure_s,
                 "f_number": photograph.f_number,
                 "iso": photograph.iso,
+                **{
+                    name: value
+                    for name in ("camera", "lens", "taken")
+                    if (value := getattr(photograph, name)) is not None
+                },
             }
             for photograph in capture.photographs
         ],

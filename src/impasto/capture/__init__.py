@@ -15,11 +15,10 @@ from impasto.capture.light_files import find_light_file, read_light_file
 from impasto.capture.lights import LightFile, check_rows, make_lights
 from impasto.capture.pairing import Pair, pair
 from impasto.capture.photographs import (
-    RAW_ENDINGS,
-    READERS,
     Photograph,
     find_photographs,
     read_photograph,
+    without_previews,
 )
 from impasto.errors import CaptureError, Problem, raise_problems
 from impasto.geometry import Camera, Lights
@@ -70,7 +69,7 @@ def read_capture(
     Parameters
     ----------
     folder : path
-        Folder of TIFF, EXR, PNG or JPEG photographs; its subfolders are not looked at.
+        Folder of TIFF, EXR, PNG, JPEG or raw photographs; its subfolders are not looked at.
     lights : path, optional
         Light file: .lp, .csv, .toml, or .txt with a bare matrix. Found in the folder if it is the only one.
     exclude : iterable of str
@@ -96,7 +95,7 @@ def read_capture(
         problems += light_file.problems
     except CaptureError as error:
         problems += error.problems
-    paths = find_photographs(folder)
+    paths, preview_notes = without_previews(find_photographs(folder))
     if not paths:
         problems.append(_no_photographs(folder))
     pairs: list[Pair] = []
@@ -116,7 +115,7 @@ def read_capture(
         known = channels.most_common(1)[0][0] if channels else None
         row_problems, row_notes = check_rows(light_file.rows, known)
         problems += row_problems + _check_scale(light_file)
-        notes = light_file.notes + row_notes + notes
+        notes = light_file.notes + row_notes + preview_notes + notes
     raise_problems(CaptureError, problems)
     assert light_file is not None
     rows = [row for row, _ in pairs]
@@ -144,12 +143,7 @@ def _light_path(folder: Path, lights: str | PathLike[str] | None) -> Path:
 
 
 def _no_photographs(folder: Path) -> Problem:
-    raw = sum(path.suffix.lower() in RAW_ENDINGS for path in folder.iterdir())
-    what = f"holds no photographs, expected {', '.join(READERS)}"
-    if raw:
-        return Problem(
-            str(folder), f"{what}; {raw} raw files are not read", "Develop them to linear 16-bit TIFF files"
-        )
+    what = "holds no photographs, expected TIFF, EXR, PNG, JPEG or raw files"
     return Problem(str(folder), what, "Give the folder that holds them; subfolders are not looked at")
 
 

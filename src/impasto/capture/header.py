@@ -27,6 +27,8 @@ class Header:
         The embedded profile.
     exposure_s, f_number, iso : float or None
         Exposure as the camera noted it.
+    camera, lens, taken : str or None
+        Make and model of the camera, the lens, and the time of the photograph, as the camera noted them.
     orientation : int
         The EXIF orientation, 1 to 8; 1 is upright.
     remarks : tuple of str
@@ -43,6 +45,9 @@ class Header:
     exposure_s: float | None = None
     f_number: float | None = None
     iso: float | None = None
+    camera: str | None = None
+    lens: str | None = None
+    taken: str | None = None
     orientation: int = 1
     remarks: tuple[str, ...] = ()
 

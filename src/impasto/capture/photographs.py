@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto import icc
-from impasto.capture import raster, tiff
+from impasto.capture import raster, raw, tiff
 from impasto.capture.header import Header, UnreadableError
 from impasto.colour import linearisation_table
 from impasto.errors import CaptureError, OptionError, Problem
@@ -21,8 +21,8 @@ from impasto.errors import CaptureError, OptionError, Problem
 READERS = {
     **dict.fromkeys((".tif", ".tiff"), tiff),
     **dict.fromkeys((".exr", ".png", ".jpg", ".jpeg"), raster),
+    **dict.fromkeys(raw.ENDINGS, raw),
 }
-RAW_ENDINGS = (".3fr", ".arw", ".cr2", ".cr3", ".dng", ".iiq", ".nef", ".orf", ".pef", ".raf", ".rw2")
 _STATE_TRANSFER = 'State transfer = "srgb" (or "linear", or a gamma) under [photographs] in a TOML light file'
 
 
@@ -89,6 +89,22 @@ def find_photographs(folder: Path) -> list[Path]:
         ),
         key=lambda path: natural_key(path.name),
     )
+
+
+def without_previews(paths: list[Path]) -> tuple[list[Path], list[str]]:
+    """Leave out the JPEG files that a camera wrote beside its raw files, and say so.
+
+    Returns
+    -------
+    paths : list of Path
+    notes : list of str
+    """
+    raws = {path.stem for path in paths if path.suffix.lower() in raw.ENDINGS}
+    kept = [path for path in paths if path.stem not in raws or path.suffix.lower() not in (".jpg", ".jpeg")]
+    left = len(paths) - len(kept)
+    if not left:
+        return kept, []
+    return kept, [f"{left} JPEG file{'s' if left > 1 else ''} beside raw files of the same name left out"]
 
 
 def natural_key(name: str) -> tuple[list[str | int], str]:

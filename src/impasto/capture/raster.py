@@ -72,6 +72,9 @@ def read_header(path: Path) -> Header:
             exposure_s=_number(spec, "ExposureTime"),
             f_number=_number(spec, "FNumber"),
             iso=_number(spec, "Exif:PhotographicSensitivity") or _number(spec, "Exif:ISOSpeedRatings"),
+            camera=" ".join(filter(None, (_text(spec, "Make"), _text(spec, "Model")))) or None,
+            lens=_text(spec, "Exif:LensModel"),
+            taken=_text(spec, "Exif:DateTimeOriginal"),
             orientation=spec.getattribute("Orientation") or 1,
             remarks=tuple(remarks),
         )
@@ -213,6 +216,11 @@ def _check_exr(image: ImageInput) -> None:
             f"has a data window (x, y, width, height) {data} that is not its display window {display}",
             "Save the whole picture, without a crop or overscan",
         )
+
+
+def _text(spec: ImageSpec, name: str) -> str | None:
+    value = spec.getattribute(name)
+    return str(value).strip() or None if value is not None else None
 
 
 def _number(spec: ImageSpec, name: str) -> float | None:

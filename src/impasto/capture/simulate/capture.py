@@ -164,7 +164,7 @@ def simulate(
         default sRGB for files of 8 bits and linear for others.
     vignetting : float
         Share of light lost in the image's corners.
-    format : {'tiff', 'png', 'jpeg', 'exr'}
+    format : {'tiff', 'png', 'jpeg', 'exr', 'dng'}
         Of the photographs. EXR stands for merged exposures: floats that never clip.
     bits : int, optional
         8 or 16 per value for TIFF and PNG, 16 by default.

@@ -7,10 +7,11 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from impasto.capture.simulate.dng import write_dng
 from impasto.images import Compression, write_exr, write_jpeg, write_png, write_tiff
 from impasto.output import prepare_folder
 
-ENDINGS = {"tiff": ".tif", "png": ".png", "jpeg": ".jpg", "exr": ".exr"}
+ENDINGS = {"tiff": ".tif", "png": ".png", "jpeg": ".jpg", "exr": ".exr", "dng": ".dng"}
 
 
 def write_image(path: Path, image: NDArray[Any], compression: Compression = "zstd") -> None:
@@ -19,7 +20,7 @@ def write_image(path: Path, image: NDArray[Any], compression: Compression = "zst
     Parameters
     ----------
     path : Path
-        Ending in .tif, .png, .jpg or .exr; its folder is made if need be.
+        Ending in .tif, .png, .jpg, .exr or .dng; its folder is made if need be.
     image : ndarray of shape (H, W) or (H, W, C)
         uint8 or uint16; float32 for .exr.
     compression : {'zstd', 'deflate', 'lzw', 'none'}, optional
@@ -37,5 +38,7 @@ def write_image(path: Path, image: NDArray[Any], compression: Compression = "zst
         write_jpeg(path, image)
     elif path.suffix == ".png":
         write_png(path, image, None)
+    elif path.suffix == ".dng":
+        write_dng(path, image)
     else:
         write_exr(path, image)

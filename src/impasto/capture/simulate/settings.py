@@ -179,7 +179,9 @@ class Settings:
     def _file_problems(self) -> Iterator[Problem]:
         if self.format not in ENDINGS:
             yield Problem("format", f"{self.format!r} is not written", f"Choose one of {', '.join(ENDINGS)}")
-        depths = {"tiff": (8, 16), "png": (8, 16), "jpeg": (8,), "exr": (32,)}.get(self.format, ())
+        depths = {"tiff": (8, 16), "png": (8, 16), "jpeg": (8,), "exr": (32,), "dng": (16,)}.get(
+            self.format, ()
+        )
         if self.bits is not None and depths and self.bits not in depths:
             wanted = " or ".join(str(depth) for depth in depths)
             yield Problem(
@@ -195,9 +197,11 @@ class Settings:
             yield Problem(
                 "response", f"{self.response!r} is not known", "Choose linear, srgb, gamma:<number> or tone"
             )
-        elif self.format == "exr" and self.response not in (None, "linear"):
+        elif self.format in ("exr", "dng") and self.response not in (None, "linear"):
             yield Problem(
-                "response", f"{self.response!r} does not go with exr, which is linear", "Leave it out"
+                "response",
+                f"{self.response!r} does not go with {self.format}, which is linear",
+                "Leave it out",
             )
         if self.format == "exr" and self.brackets:
             yield Problem("brackets", "do not go with exr, which never clips", "Leave them out")
