@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from impasto.errors import ImpastoError
     from impasto.evaluate import evaluate
     from impasto.evaluate.gloss import gloss
+    from impasto.evaluate.gonio import gonio
     from impasto.fit import fit
     from impasto.geometry import Camera, Lights
     from impasto.maps import maps
@@ -37,6 +38,7 @@ __all__ = [
     "evaluate",
     "fit",
     "gloss",
+    "gonio",
     "maps",
     "models",
     "open",
@@ -55,6 +57,7 @@ _HOME = {
     "evaluate": "evaluate",
     "fit": "fit",
     "gloss": "evaluate.gloss",
+    "gonio": "evaluate.gonio",
     "maps": "maps",
     "models": "models",
     "open": "store",

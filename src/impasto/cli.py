@@ -18,6 +18,8 @@ from impasto.summaries import (
     fit_lines,
     gloss_lines,
     gloss_table,
+    gonio_lines,
+    gonio_table,
     maps_lines,
     model_lines,
     render_lines,
@@ -328,6 +330,33 @@ def evaluate(
             report.say()
             report.say(heading)
             report.table(header, rows)
+        report.done(summary)
+
+
+@app.command(epilog="Example: impasto gonio painting.zarr --pixel 120,80 --out curves/")
+def gonio(
+    store: Store,
+    out: Out,
+    model: Annotated[
+        list[str] | None,
+        typer.Option("--model", metavar="NAME", help="May be repeated; those in the store by default."),
+    ] = None,
+    pixel: Annotated[
+        list[str] | None,
+        typer.Option("--pixel", metavar="COLUMN,ROW", help="A single pixel; may be repeated."),
+    ] = None,
+    regions: Annotated[
+        Path | None,
+        typer.Option("--regions", metavar="FILE", help="Picture with a colour per region, black outside."),
+    ] = None,
+    json: Json = None,
+    debug: Debug = False,
+) -> None:
+    """Plot measured and modelled radiance against the angle of the light."""
+    with reporting("gonio", json, debug) as report:
+        summary = impasto.gonio(store, out=out, models=model or (), pixels=_pixels(pixel), regions=regions)
+        report.table(*gonio_table(summary))
+        report.say_all(gonio_lines(summary))
         report.done(summary)
 
 

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from impasto.capture.simulate import Simulation
     from impasto.evaluate import EvaluateSummary
     from impasto.evaluate.gloss import GlossSummary
+    from impasto.evaluate.gonio import GonioSummary
     from impasto.fit import FitSummary, ModelFit
     from impasto.maps import MapsSummary
     from impasto.models import ModelSpec
@@ -107,6 +108,25 @@ def evaluate_tables(summary: EvaluateSummary) -> Iterator[tuple[str, Row, list[R
         rows.append(("mean", "", f"{mean.psnr_db:.2f}", f"{mean.ssim:.4f}", f"{mean.rms_relative:#.4g}"))
         how = "fitted again without them" if model.refitted else "the fit in the store has not seen them"
         yield f"{model.model} ({model.procedure}; {how})", header, rows
+
+
+def gonio_table(summary: GonioSummary) -> tuple[Row, list[Row]]:
+    """Return the columns' names, and a row per place and model: its signed errors by band."""
+    rows: list[Row] = []
+    for curve in summary.curves:
+        for name, model in curve.models.items():
+            errors = ["no light" if e is None else f"{100 * e:+.2f} %" for e in model.signed_error.values()]
+            rows.append((curve.name, name, f"{curve.half_width_deg:.1f}°", *errors))
+    return ("model − measured", "model", "half-width", "peak", "shoulder", "rest"), rows
+
+
+def gonio_lines(summary: GonioSummary) -> Iterator[str]:
+    """Yield what the bands are, and where the plots lie."""
+    yield (
+        "in luminance, as share of the measured mean of the band: peak within one half-width of the "
+        "highlight from the mirror direction, shoulder one to three, rest beyond"
+    )
+    yield f"{_count(len(summary.curves), 'curve')} in {summary.out}, each as a plot and as a table"
 
 
 def gloss_table(summary: GlossSummary) -> tuple[Row, list[Row]]:

@@ -15,9 +15,8 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
 from impasto.band_writers import BandWriter
-from impasto.errors import OptionError, Problem, raise_problems
 from impasto.evaluate.glossmeter import GLOSSMETERS, Glossmeter, quadrature
-from impasto.evaluate.regions import Sample, read_regions, sample_regions
+from impasto.evaluate.regions import Sample, check_inside, read_regions, sample_regions
 from impasto.geometry import Array, Camera, Lights
 from impasto.map_pictures import draw_values
 from impasto.models import ModelSpec, basis, parse_model
@@ -157,7 +156,7 @@ def gloss(
     fit = open_fit(Path(store), spec.name)
     stack = open_stack(Path(store))
     height, width = fit.shape
-    _check_inside(pixels, height, width)
+    check_inside(pixels, height, width)
     drawn = read_regions(Path(regions), height, width) if regions else None
     folder = prepare_folder(out) if out else None
     tables = [PixelGloss(spec, fit.attributes, meter) for meter in GLOSSMETERS]
@@ -314,21 +313,6 @@ def _write_maps(
             logarithmic=True,
         )
         yield from (folder / f"{name}.exr", folder / f"{name}.png")
-
-
-def _check_inside(pixels: Sequence[tuple[int, int]], height: int, width: int) -> None:
-    raise_problems(
-        OptionError,
-        [
-            Problem(
-                where=f"--pixel {column},{row}",
-                what=f"lies outside of the painting, which has {width} columns and {height} rows",
-                do=f"Count from 0: column up to {width - 1}, row up to {height - 1}",
-            )
-            for column, row in pixels
-            if not (0 <= column < width and 0 <= row < height)
-        ],
-    )
 
 
 def facet_angles_deg(lights: Lights, camera: Camera) -> tuple[float, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.capture.photographs import read_photograph
-from impasto.errors import CaptureError, OptionError, Problem
+from impasto.errors import CaptureError, OptionError, Problem, raise_problems
 from impasto.pixels import Pixels, join_pixels, read_pixels
 from impasto.progress import progress
 from impasto.store import Fit
@@ -93,6 +94,28 @@ def read_regions(path: Path, height: int, width: int) -> Regions:
         for colour in colours[drawn]
     )
     return Regions(names, number[index].reshape(height, width))
+
+
+def check_inside(pixels: Sequence[tuple[int, int]], height: int, width: int) -> None:
+    """Check that pixels, as column and row, lie in a painting.
+
+    Raises
+    ------
+    OptionError
+        Listing all that do not.
+    """
+    raise_problems(
+        OptionError,
+        [
+            Problem(
+                where=f"--pixel {column},{row}",
+                what=f"lies outside of the painting, which has {width} columns and {height} rows",
+                do=f"Count from 0: column up to {width - 1}, row up to {height - 1}",
+            )
+            for column, row in pixels
+            if not (0 <= column < width and 0 <= row < height)
+        ],
+    )
 
 
 @dataclass(frozen=True)
