@@ -40,6 +40,7 @@ def test_commands_stand_in_the_order_of_the_pipeline():
         "render",
         "maps",
         "evaluate",
+        "compare",
         "gonio",
         "gloss",
         "models",

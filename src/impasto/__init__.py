@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from impasto.demo import demo
     from impasto.errors import ImpastoError
     from impasto.evaluate import evaluate
+    from impasto.evaluate.compare import compare
     from impasto.evaluate.gloss import gloss
     from impasto.evaluate.gonio import gonio
     from impasto.fit import fit
@@ -34,6 +35,7 @@ __all__ = [
     "FitOptions",
     "ImpastoError",
     "Lights",
+    "compare",
     "demo",
     "evaluate",
     "fit",
@@ -53,6 +55,7 @@ _HOME = {
     "FitOptions": "procedure",
     "ImpastoError": "errors",
     "Lights": "geometry",
+    "compare": "evaluate.compare",
     "demo": "demo",
     "evaluate": "evaluate",
     "fit": "fit",

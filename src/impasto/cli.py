@@ -14,6 +14,8 @@ from impasto.console import reporting
 from impasto.errors import OptionError, Problem
 from impasto.fit import PROCEDURES, FitOptions
 from impasto.summaries import (
+    compare_lines,
+    compare_tables,
     evaluate_tables,
     fit_lines,
     gloss_lines,
@@ -330,6 +332,34 @@ def evaluate(
             report.say()
             report.say(heading)
             report.table(header, rows)
+        report.done(summary)
+
+
+@app.command(epilog="Example: impasto compare painting.zarr --regions drawn.png --out comparison/")
+def compare(
+    store: Store,
+    model: Annotated[
+        list[str] | None,
+        typer.Option("--model", metavar="NAME", help="May be repeated; those in the store by default."),
+    ] = None,
+    regions: Annotated[
+        Path | None,
+        typer.Option("--regions", metavar="FILE", help="Picture with a colour per region, black outside."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for a map of the models chosen.")
+    ] = None,
+    json: Json = None,
+    debug: Debug = False,
+) -> None:
+    """Compare the fitted models: As/Ad, errors at highlights and elsewhere, and the choice per pixel."""
+    with reporting("compare", json, debug) as report:
+        summary = impasto.compare(store, models=model or (), regions=regions, out=out)
+        for heading, header, rows in compare_tables(summary):
+            report.say(heading)
+            report.table(header, rows)
+            report.say()
+        report.say_all(compare_lines(summary))
         report.done(summary)
 
 

@@ -114,6 +114,10 @@ def reporting(command: str, json_file: Path | None = None, debug: bool = False) 
     except ImpastoError as error:
         code, problems = EXIT_PROBLEM, error.problems
         show_problems(command, problems)
+    except BrokenPipeError:
+        # Whoever reads the output, such as head, has seen enough; Python would complain again at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = EXIT_PROBLEM
     except OSError as error:
         if error.errno not in _FAULTS_OF_THE_DISK:
             code, problems = EXIT_PROBLEM, [show_fault(command, error, debug)]

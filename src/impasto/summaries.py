@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from impasto.capture.simulate import Simulation
     from impasto.evaluate import EvaluateSummary
+    from impasto.evaluate.compare import CompareSummary
     from impasto.evaluate.gloss import GlossSummary
     from impasto.evaluate.gonio import GonioSummary
     from impasto.fit import FitSummary, ModelFit
@@ -108,6 +110,41 @@ def evaluate_tables(summary: EvaluateSummary) -> Iterator[tuple[str, Row, list[R
         rows.append(("mean", "", f"{mean.psnr_db:.2f}", f"{mean.ssim:.4f}", f"{mean.rms_relative:#.4g}"))
         how = "fitted again without them" if model.refitted else "the fit in the store has not seen them"
         yield f"{model.model} ({model.procedure}; {how})", header, rows
+
+
+def compare_tables(summary: CompareSummary) -> Iterator[tuple[str, Row, list[Row]]]:
+    """Yield for each region a heading, the columns' names, and a row per model."""
+    header = ("model", "unknowns", "RMS / mean", "at highlights", "elsewhere", "As/Ad", "chosen")
+    for region in summary.regions:
+        rows: list[Row] = []
+        for model in region.models:
+            ratio = model.ratio
+            told = "" if ratio is None else f"{ratio.mean:.4g} ({ratio.low:.3g} – {ratio.high:.3g})"
+            errors = (model.rms, model.rms_highlight, model.rms_elsewhere)
+            rows.append(
+                (
+                    model.model,
+                    str(model.unknowns),
+                    *("no light" if math.isnan(error) else f"{error:.4f}" for error in errors),
+                    told,
+                    percent(model.chosen),
+                )
+            )
+        yield f"{region.name}: {_count(region.pixels, 'pixel')}", header, rows
+
+
+def compare_lines(summary: CompareSummary) -> Iterator[str]:
+    """Yield what the columns mean."""
+    first = summary.regions[0]
+    yield (
+        f"highlights: where that of {first.models[0].model} makes more than a tenth of the radiance; "
+        "As/Ad: mean of the pixels, Ad in luminance, with 5th and 95th percentile"
+    )
+    yield "chosen: share of the pixels whose Bayesian information criterion is least with the model"
+    if first.unknown_pixels:
+        yield f"{_count(first.unknown_pixels, 'pixel')} left out: some model has no full fit there"
+    if summary.files:
+        yield f"map of the choice in {summary.files[0].parent}"
 
 
 def gonio_table(summary: GonioSummary) -> tuple[Row, list[Row]]:

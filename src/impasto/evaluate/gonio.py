@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from impasto.errors import OptionError, Problem
+from impasto.evaluate.compare import ordered_fits
 from impasto.evaluate.curve_plot import draw_curve
 from impasto.evaluate.curves import Curve, CurveSums, columns
 from impasto.evaluate.regions import Regions, check_inside, read_regions, sample_regions
@@ -21,7 +22,7 @@ from impasto.models import basis, parse_model
 from impasto.output import prepare_folder, write_text
 from impasto.pixels import Pixels, read_pixels
 from impasto.progress import progress
-from impasto.store import Fit, Stack, fitted_models, open_fit, open_stack
+from impasto.store import Fit, Stack, open_fit, open_stack
 
 _TILE_ROWS, _TILE_COLUMNS = 256, 512
 _SAMPLED = 20_000
@@ -91,7 +92,7 @@ def gonio(
     started = time.perf_counter()
     path = Path(store)
     stack = open_stack(path)
-    names = [parse_model(name).name for name in models] or _fitted(path)
+    names = [parse_model(name).name for name in models] or ordered_fits(path)
     fits = {name: open_fit(path, name) for name in names}
     height, width = stack.shape[1:3]
     check_inside(pixels, height, width)
@@ -110,18 +111,6 @@ def gonio(
         draw_curve(stem.with_suffix(".png"), curve, fits)
         files += [stem.with_suffix(".png"), stem.with_suffix(".csv")]
     return GonioSummary(path, folder, tuple(curves), tuple(files), time.perf_counter() - started)
-
-
-def _fitted(store: Path) -> list[str]:
-    # Torrance-Sparrow first where it is there: its lobe tells the bands.
-    names = sorted(fitted_models(store), key=lambda name: (not name.startswith("torrance-sparrow"), name))
-    if not names:
-        raise OptionError(
-            Problem(
-                f"{store}: fits", "holds no fit, at least one is expected", f"Run impasto fit {store} first"
-            )
-        )
-    return names
 
 
 def _pixel_curve(name: str, column: int, row: int, stack: Stack, fits: Mapping[str, Fit]) -> Curve:
