@@ -6,8 +6,8 @@ matter. Directions are unit vectors of shape (..., 3) that point away from the s
 
 References
 ----------
-[Chen2007], [TorranceSparrow1967], [Blinn1977], [TrowbridgeReitz1975], [Heitz2014], and [Born1999], section
-1.5; in full in docs/references.md.
+[Chen2007], [TorranceSparrow1967], [Blinn1977], [TrowbridgeReitz1975], [Heitz2014], [Burley2012], [Ward1992],
+and [Born1999], section 1.5; in full in docs/references.md.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ MODELS = {
     "torrance-sparrow": (("c",), "trowbridge-reitz", "v-groove"),
     "torrance-sparrow-gaussian": (("m",), "gaussian", "v-groove"),
     "torrance-sparrow-smith": (("c",), "trowbridge-reitz", "smith"),
+    "gtr": (("c", "exponent"), "generalised-trowbridge-reitz", "v-groove"),
+    "ward": (("alpha",), None, None),
 }
 
 
@@ -42,6 +44,11 @@ def unit(a):
 def trowbridge_reitz(n_h, c):
     """D = [c² / ((n·h)² (c² − 1) + 1)]², 1 at n·h = 1 ([TrowbridgeReitz1975], [Chen2007] Eq. 3)."""
     return (c**2 / (n_h**2 * (c**2 - 1) + 1)) ** 2
+
+
+def generalised_trowbridge_reitz(n_h, c, exponent):
+    """D = [c² / ((n·h)² (c² − 1) + 1)]^exponent ([Burley2012])."""
+    return (c**2 / (n_h**2 * (c**2 - 1) + 1)) ** exponent
 
 
 def gaussian(n_h, m):
@@ -78,8 +85,8 @@ def basis(model, shape, normal, light, view, *, index=1.5, fresnel="facet"):
     ----------
     model : str
         A name in `MODELS`.
-    shape : float or ndarray of shape (...)
-        c, m or the shininess; ignored by `lambert`.
+    shape : float or ndarray of shape (...) or, for a model of several shape parameters, (..., S)
+        In the order of `MODELS`; ignored by `lambert`.
     normal, light, view : array_like of shape (..., 3)
         Unit vectors, broadcastable against each other and against `shape`.
     index : float
@@ -90,8 +97,8 @@ def basis(model, shape, normal, light, view, *, index=1.5, fresnel="facet"):
     Returns
     -------
     diffuse, specular : ndarray of shape (...)
-        max(0, n·l), and max(0, r·v)^shininess [Chen2007] Eq. 1 or D F G/(n·v) [Chen2007] Eq. 2 (zero for
-        `lambert`); both zero where n·l ≤ 0 or n·v ≤ 0.
+        max(0, n·l), and max(0, r·v)^shininess [Chen2007] Eq. 1, D F G/(n·v) [Chen2007] Eq. 2 or
+        √(n·l/n·v) exp(−tan² δ/alpha²) [Ward1992] (zero for `lambert`); both zero where n·l ≤ 0 or n·v ≤ 0.
     """
     normal, light, view = np.broadcast_arrays(*(np.asarray(a, float) for a in (normal, light, view)))
     _, distribution, attenuation = MODELS[model]
@@ -108,7 +115,13 @@ def basis(model, shape, normal, light, view, *, index=1.5, fresnel="facet"):
     normal, light, view = (np.where(faces[..., None], a, up) for a in (normal, light, view))
     half = unit(light + view)
     n_l, n_v, n_h, v_h = dot(normal, light), dot(normal, view), dot(normal, half), dot(view, half)
-    d = trowbridge_reitz(n_h, shape) if distribution == "trowbridge-reitz" else gaussian(n_h, shape)
+    if model == "ward":
+        lobe = np.sqrt(n_l / n_v) * np.exp(-(1 / n_h**2 - 1) / np.asarray(shape) ** 2)
+        return diffuse, np.where(faces, lobe, 0)
+    if distribution == "generalised-trowbridge-reitz":
+        d = generalised_trowbridge_reitz(n_h, *np.moveaxis(np.asarray(shape, float), -1, 0))
+    else:
+        d = trowbridge_reitz(n_h, shape) if distribution == "trowbridge-reitz" else gaussian(n_h, shape)
     f = fresnel_dielectric({"facet": v_h, "element": n_l}[fresnel], index)
     g = v_groove(n_h, n_v, n_l, v_h) if attenuation == "v-groove" else smith(n_l, n_v, shape)
     return diffuse, np.where(faces, d * f * g / n_v, 0)
@@ -177,7 +190,8 @@ def radiance(
         A name in `MODELS`; a suffix that says whether the fit has an ambient term makes no difference here.
     normal : array_like of shape (N, 3)
     diffuse : array_like of shape (N, C)
-    specular, shape : array_like of shape (N,) or (N, 1)
+    specular : array_like of shape (N,) or (N, 1)
+    shape : array_like of shape (N,) or (N, S)
     ambient : array_like of shape (N, C), optional
     light_direction, light_position_mm : array_like of shape (L, 3)
     light_intensity : array_like of shape (L, C) or (L, 1)
@@ -203,7 +217,9 @@ def radiance(
 
     light, irradiance = light_geometry(light_direction, light_position_mm, position_mm)
     view = view_geometry(view_direction, camera_distance_mm, position_mm)
-    flat_shape = np.zeros(pixels) if np.size(shape) == 0 else np.reshape(np.asarray(shape, float), pixels)
+    several = len(MODELS[base_name(model)][0])
+    form = (pixels, several) if several > 1 else pixels
+    flat_shape = np.zeros(pixels) if np.size(shape) == 0 else np.reshape(np.asarray(shape, float), form)
     flat_specular = np.zeros(pixels) if np.size(specular) == 0 else np.reshape(specular, pixels)
     of_diffuse, of_specular = basis(
         base_name(model), flat_shape, normal, light, view, index=index, fresnel=fresnel

@@ -17,7 +17,7 @@ from impasto.geometry import dome_direction
 from reference_models import unit
 
 NOISE = (1e-3, 0.0, 0.01)
-SHAPES = {"c": 0.25, "m": 0.25, "shininess": 30.0}
+SHAPES = {"c": 0.25, "m": 0.25, "shininess": 30.0, "alpha": 0.25, "exponent": 1.6}
 
 
 def names():
@@ -66,13 +66,15 @@ def fit(model, radiance, light_direction, **options):
 def truth(model, pixels=24):
     """Return parameter maps in float64 for the reference's `radiance`."""
     entry, ambient = entry_of(model)
-    rng = np.random.default_rng(5)
-    width = SHAPES[entry["shape"][0][0]] if entry["shape"] else np.nan
+    rng, base = np.random.default_rng(5), entry["name"]
+    shape = [SHAPES[parameter[0]] for parameter in entry["shape"]]
     maps = {
         "normal": dome_direction(np.radians(rng.uniform(0, 15, pixels)), rng.uniform(0, 2 * np.pi, pixels)),
         "diffuse": rng.uniform(0.1, 0.8, (pixels, 3)),
-        "specular": rng.uniform(8, 15, pixels) if "torrance" in model else rng.uniform(0.3, 0.6, pixels),
-        "shape": width * rng.uniform(0.8, 1.2, pixels),
+        "specular": rng.uniform(0.3, 0.6, pixels)
+        if base in ("phong", "ward")
+        else rng.uniform(8, 15, pixels),
+        "shape": shape * rng.uniform(0.8, 1.2, (pixels, len(shape))),
     }
     if ambient:
         maps["ambient"] = rng.uniform(0.02, 0.06, (pixels, 3))
@@ -82,6 +84,7 @@ def truth(model, pixels=24):
 def standard_deviations(model, maps, light_direction):
     """Return the standard deviations by the Fisher information, from differences of the reference."""
     entry, ambient = entry_of(model)
+    count = len(entry["shape"])
     across = unit(np.cross([0.0, 1.0, 0.0], maps["normal"]))
     along = np.cross(maps["normal"], across)
 
@@ -107,7 +110,10 @@ def standard_deviations(model, maps, light_direction):
     }
     if entry["lobes"]:
         parameters["specular"] = [lambda step: {"specular": maps["specular"] + step}]
-        parameters["shape"] = [lambda step: {"shape": maps["shape"] * (1 + step)}]
+        parameters["shape"] = [
+            lambda step, index=index: {"shape": maps["shape"] * (1 + step * (np.arange(count) == index))}
+            for index in range(count)
+        ]
     if ambient:
         parameters["ambient"] = [channel_step("ambient", channel) for channel in range(3)]
     derivatives = [difference(change, 1e-6) for changes in parameters.values() for change in changes]
@@ -125,7 +131,7 @@ def standard_deviations(model, maps, light_direction):
     deviations = {f"{name}_sd": np.sqrt(values) for name, values in slices.items()}
     deviations["normal_sd"] = np.sqrt(slices["normal"].sum(axis=1))
     if entry["lobes"]:
-        deviations["shape_sd"] *= maps["shape"][:, None]
+        deviations["shape_sd"] *= maps["shape"]
     return deviations
 
 
@@ -136,11 +142,16 @@ def test_recovers_its_own_rendering_with_the_reference_standard_deviations(model
     fitted = fit(model, reference.radiance(model, **maps, light_direction=lights).astype(np.float32), lights)
     assert not fitted["status"].any()
     np.testing.assert_allclose(fitted["normal"], maps["normal"], atol=1e-5)
-    np.testing.assert_allclose(fitted["diffuse"], maps["diffuse"], rtol=1e-4)
-    if entry_of(model)[0]["lobes"]:
-        np.testing.assert_allclose(fitted["specular"][:, 0], maps["specular"], rtol=1e-3)
-        np.testing.assert_allclose(fitted["shape"][:, 0], maps["shape"], rtol=1e-3)
-    for name, expected in standard_deviations(model, maps, lights).items():
+    deviations = standard_deviations(model, maps, lights)
+    # Two shape parameters can stand in for each other: the weak priors then show, at a small part of the
+    # uncertainty.
+    share = 0.05 if maps["shape"].shape[1] > 1 else 0.0
+    for name, tolerance in [("diffuse", 1e-4), ("specular", 1e-3), ("shape", 1e-3)]:
+        if f"{name}_sd" in deviations:
+            expected = maps[name].reshape(fitted[name].shape)
+            slack = tolerance * expected + share * deviations[f"{name}_sd"]
+            assert (np.abs(fitted[name] - expected) <= slack).all(), name
+    for name, expected in deviations.items():
         np.testing.assert_allclose(fitted[name], expected, rtol=0.02, err_msg=name)
 
 

@@ -28,7 +28,7 @@ class Claims:
     ----------
     reciprocal : bool
         f(l, v) = f(v, l) for the lobe over n·l, with F at the facet's angle.
-    furnace : dict of float to float, or None
+    furnace : dict of float or tuple of float to float, or None
         Least share of white light that the lossless lobe (F = 1, magnitude of a smooth interface) returns at
         any view, per shape: the rest was scattered more than once. None: there is no lossless magnitude.
     """
@@ -43,6 +43,8 @@ CLAIMS = {
     "torrance-sparrow": Claims(reciprocal=True, furnace={0.1: 0.94, 0.3: 0.86, 0.6: 0.61}),
     "torrance-sparrow-gaussian": Claims(reciprocal=True, furnace={0.1: 0.94, 0.3: 0.92, 0.6: 0.77}),
     "torrance-sparrow-smith": Claims(reciprocal=True, furnace={0.1: 0.89, 0.3: 0.82, 0.6: 0.59}),
+    "gtr": Claims(reciprocal=True, furnace={(0.1, 2.0): 0.94, (0.3, 2.0): 0.86, (0.3, 4.0): 0.92}),
+    "ward": Claims(reciprocal=True, furnace=None),
 }
 SPECULAR = [name for name, entry in MODELS.items() if entry["lobes"]]
 
@@ -76,7 +78,7 @@ def render(model, normal, diffuse, specular, shape, ambient=None, *, light_direc
         np.asarray(normal),
         np.asarray(diffuse),
         np.reshape(specular, (pixels, 1))[:, : entry["lobes"]],
-        np.reshape(shape, (pixels, 1))[:, : len(entry["shape"])],
+        np.reshape(shape, (pixels, -1))[:, : len(entry["shape"])],
     )
     return _core.render(
         model,
@@ -88,7 +90,8 @@ def render(model, normal, diffuse, specular, shape, ambient=None, *, light_direc
 
 
 def typical_shape(model):
-    return {"c": 0.25, "m": 0.25, "shininess": 30.0}[MODELS[model]["shape"][0][0]]
+    typical = {"c": 0.25, "m": 0.25, "shininess": 30.0, "alpha": 0.25, "exponent": 1.6}
+    return [typical[parameter[0]] for parameter in MODELS[model]["shape"]]
 
 
 def hemisphere(steps=300):
@@ -155,12 +158,13 @@ def test_float32_rendering_equals_the_reference(model):
     pixels = 203  # not a multiple of the lanes
     normal = random_directions(rng, pixels, 40).astype(np.float32)
     bounds = MODELS[model]["shape"]
-    lower, upper = (0.02, 0.9) if not bounds or bounds[0][0] != "shininess" else (1, 2000)
+    ranges = {"shininess": (1, 2000), "exponent": (0.7, 4)}
+    limits = np.log([ranges.get(parameter[0], (0.02, 0.9)) for parameter in bounds] or [(1, 1)])
     maps = {
         "normal": normal,
         "diffuse": rng.uniform(0, 1, (pixels, 3)).astype(np.float32),
         "specular": rng.uniform(0, 5, pixels).astype(np.float32),
-        "shape": np.exp(rng.uniform(np.log(lower), np.log(upper), pixels)).astype(np.float32),
+        "shape": np.exp(rng.uniform(*limits.T, (pixels, len(limits)))).astype(np.float32),
     }
     options = {
         "light_direction": random_directions(rng, 7),
@@ -182,7 +186,7 @@ def test_near_lights_and_perspective_camera(model):
         "normal": random_directions(rng, pixels, 20).astype(np.float32),
         "diffuse": rng.uniform(0, 1, (pixels, 3)).astype(np.float32),
         "specular": np.ones(pixels, np.float32),
-        "shape": np.full(pixels, typical_shape(model), np.float32),
+        "shape": np.tile(np.float32(typical_shape(model)), (pixels, 1)),
         "ambient": rng.uniform(0, 0.1, (pixels, 3)).astype(np.float32),
     }
     direction = random_directions(rng, lights, 60)
@@ -213,7 +217,8 @@ def test_reciprocity(model, fresnel):
     )
     differs = np.abs(one_way - other_way) > 1e-9 * np.maximum(one_way, other_way)
     # F at the element's angle of incidence treats l and v unlike: the paper read literally is not reciprocal.
-    if CLAIMS[model].reciprocal and fresnel == "facet":
+    # Ward's lobe has no F.
+    if CLAIMS[model].reciprocal and (fresnel == "facet" or model == "ward"):
         assert not differs.any()
     else:
         assert differs.mean() > 0.5
@@ -234,7 +239,8 @@ def test_white_furnace(model):
         # The facets' projected areas must add up to the surface's: with N = ∫ D cos δ dω, which is π c² for
         # Trowbridge-Reitz, the lossless magnitude is π/(4 N). The index 1e6 makes F 1.
         distribution = getattr(reference, reference.MODELS[model][1].replace("-", "_"))
-        normalisation = (distribution(light[:, 2], shape) * light[:, 2] * solid_angle).sum()
+        of_facets = distribution(light[:, 2], *np.atleast_1d(shape))
+        normalisation = (of_facets * light[:, 2] * solid_angle).sum()
         if reference.MODELS[model][1] == "trowbridge-reitz":
             assert normalisation == pytest.approx(np.pi * shape**2, rel=1e-3)
         for zenith_deg in (0, 30, 60, 80):
@@ -257,7 +263,8 @@ def test_positive_where_lit_and_zero_where_dark(model):
     rng = np.random.default_rng(4)
     light, view, normal = (unit(rng.standard_normal((3000, 3))) for _ in range(3))
     bounds = MODELS[model]["shape"]
-    shapes = [[]] if not bounds else [[bounds[0][1]], [typical_shape(model)], [bounds[0][2]]]
+    lowest, highest = ([parameter[end] for parameter in bounds] for end in (1, 2))
+    shapes = [lowest, typical_shape(model), highest]
     for shape in shapes:
         diffuse, specular = basis(model, shape, normal, light, view)
         dark = (reference.dot(normal, light) <= 0) | (reference.dot(normal, view) <= 0)

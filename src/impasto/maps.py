@@ -33,6 +33,8 @@ _TITLES = {
     "c": "Width of the highlight, c",
     "m": "Width of the highlight, m",
     "shininess": "Shininess",
+    "alpha": "Slope of the facets, alpha",
+    "exponent": "Exponent of the facets' distribution",
     "chi2_reduced": "Reduced chi-square",
     "residual_rms": "Residual",
     "view_tilt": "Tilt of the view that suits the highlight",
@@ -43,11 +45,13 @@ _LABELS = {
     "c": "c (small is glossy)",
     "m": "m (small is glossy)",
     "shininess": "shininess (large is glossy)",
+    "alpha": "alpha (small is glossy)",
+    "exponent": "exponent (small has long tails)",
     "chi2_reduced": "reduced chi-square",
     "residual_rms": "RMS residual, relative radiance",
     "view_tilt": "θv in the arm's plane, radians",
 }
-_LOGARITHMIC = {"specular", "shininess", "c", "m", "chi2_reduced", "residual_rms"}
+_LOGARITHMIC = {"specular", "shininess", "c", "m", "alpha", "exponent", "chi2_reduced", "residual_rms"}
 _COLOURS = {"diffuse", "ambient"}
 
 

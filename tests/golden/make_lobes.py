@@ -35,6 +35,9 @@ SETTINGS = [
     ("torrance-sparrow-gaussian", [0.15], 1.5, "element"),
     ("torrance-sparrow-smith", [0.02, 0.1, 0.4, 0.9], 1.5, "facet"),
     ("torrance-sparrow-smith", [0.3], 1.33, "element"),
+    ("gtr", [[0.02, 1.5], [0.1, 0.8], [0.4, 2.0], [0.7, 5.0]], 1.5, "facet"),
+    ("gtr", [[0.2, 1.2]], 1.5, "element"),
+    ("ward", [0.03, 0.15, 0.6], 1.5, "facet"),
 ]
 
 
@@ -55,7 +58,7 @@ def cases():
                 diffuse, specular = basis(model, shape, normal, light, view, index=index, fresnel=fresnel)
                 yield {
                     "model": model,
-                    "shape": [] if shape is None else [shape],
+                    "shape": [] if shape is None else np.atleast_1d(shape).tolist(),
                     "index": index,
                     "fresnel": fresnel,
                     "normal": normal,

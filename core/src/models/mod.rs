@@ -10,10 +10,12 @@ mod lambert;
 pub mod microfacet;
 mod phong;
 mod torrance_sparrow;
+mod ward;
 
 pub use lambert::Lambert;
 pub use phong::Phong;
 pub use torrance_sparrow::TorranceSparrow;
+pub use ward::Ward;
 
 use crate::geometry::Illumination;
 use crate::number::Number;
@@ -90,6 +92,8 @@ macro_rules! for_each_model {
             ("torrance-sparrow", $crate::models::TorranceSparrow<$crate::models::microfacet::TrowbridgeReitz, $crate::models::microfacet::VGroove>, false),
             ("torrance-sparrow-gaussian", $crate::models::TorranceSparrow<$crate::models::microfacet::Gaussian, $crate::models::microfacet::VGroove>, false),
             ("torrance-sparrow-smith", $crate::models::TorranceSparrow<$crate::models::microfacet::TrowbridgeReitz, $crate::models::microfacet::Smith>, false),
+            ("gtr", $crate::models::TorranceSparrow<$crate::models::microfacet::GeneralisedTrowbridgeReitz, $crate::models::microfacet::VGroove>, false),
+            ("ward", $crate::models::Ward, false),
         }
     };
 }

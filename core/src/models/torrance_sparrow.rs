@@ -12,7 +12,7 @@ use std::marker::PhantomData;
 pub struct TorranceSparrow<D, G>(PhantomData<(D, G)>);
 
 impl<D: Distribution, G: Masking> Model for TorranceSparrow<D, G> {
-    const SHAPE: &'static [ShapeParameter] = &[D::SHAPE];
+    const SHAPE: &'static [ShapeParameter] = D::SHAPE;
     const LOBES: usize = 1;
     const RECIPROCAL: bool = true;
     const STARTS: &'static [[f64; MAX_SHAPE]] = D::STARTS;
@@ -31,7 +31,7 @@ impl<D: Distribution, G: Masking> Model for TorranceSparrow<D, G> {
         let chord = chord_squared(normal, at.half);
         let normal_half = chord.scale_add(N::Real::splat(-0.5), N::splat(1.0));
         let masked = G::over_normal_view(shape[0], normal_light, normal_view, normal_half, at);
-        let lobe = D::evaluate(shape[0], chord) * masked;
+        let lobe = D::evaluate(shape, chord) * masked;
         let lobe = match optics.fresnel {
             FresnelAngle::Facet => lobe.scale(at.facet_reflectance),
             FresnelAngle::Element => lobe * fresnel(normal_light, optics.index),
