@@ -185,8 +185,8 @@ def gloss_lines(summary: GlossSummary) -> Iterator[str]:
     yield "in brackets: 5th to 95th percentile of the pixels, each as a flat sample"
     if not summary.absolute:
         yield (
-            "relative gloss: no white reference scales this stack, so numbers compare within it only; "
-            "see impasto calibrate white"
+            "relative gloss: nothing says what a white diffuser reads in this stack, so numbers compare "
+            "within it only"
         )
     if summary.extrapolated_deg:
         angles = ", ".join(f"{angle:.0f}°" for angle in summary.extrapolated_deg)

@@ -4,7 +4,7 @@
 
 use super::{Basis, MAX_SHAPE, Model, Optics, ShapeParameter};
 use crate::geometry::{Illumination, chord_squared, facing};
-use crate::number::{Number, Real};
+use crate::number::Number;
 
 pub struct Ward;
 
