@@ -7,7 +7,7 @@ use crate::number::{Mask, Number, Real, array};
 use crate::observations::{Group, Stack};
 use crate::record::{FitGroup, Layout, Row, Status};
 use crate::separable::{Loss, Point, Scratch, Separable, Solution};
-use crate::start::{Grey, candidates, doubt_shadows, grey, start};
+use crate::start::{Grey, candidates, doubt_shadows, grey, start, start_at};
 use std::marker::PhantomData;
 
 /// Rounds of a robust fit with a wider loss before the one with the loss asked for.
@@ -19,9 +19,12 @@ pub struct Options {
     pub loss: Loss,
     pub max_steps: usize,
     pub ambient: bool,
+    /// The normal of every pixel, where the surface is known; it is then not fitted, and nothing else is assumed of the
+    /// material either: the weak priors are off.
+    pub normal: Option<[f64; 3]>,
 }
 
-/// The fit of groups of eight pixels, with its buffers.
+/// The fit of groups of pixels, with its buffers.
 pub struct JointFit<'a, M, const ISA: Isa, const C: usize, const P: usize> {
     stack: &'a Stack<'a>,
     options: Options,
@@ -75,8 +78,13 @@ impl<M: Model, const ISA: Isa, const C: usize, const P: usize> FitGroup for Join
         if robust {
             doubt_shadows(&mut self.grey, illuminations, &mut self.kept);
         }
-        let mut begin =
-            start::<M, ISA>(&candidates(&self.grey, illuminations), &self.grey, illuminations, &optics, ambient);
+        let known: Option<[Lane<ISA>; 3]> = self.options.normal.map(|normal| array!(|i| Lane::splat(normal[i])));
+        let mut begin = match known {
+            Some(normal) => start_at::<M, ISA>(normal, &self.grey, illuminations, &optics, ambient),
+            None => {
+                start::<M, ISA>(&candidates(&self.grey, illuminations), &self.grey, illuminations, &optics, ambient)
+            }
+        };
 
         let mut problem = Separable::<M, ISA, C, P>::new(
             &self.group,
@@ -86,6 +94,8 @@ impl<M: Model, const ISA: Isa, const C: usize, const P: usize> FitGroup for Join
             ambient,
             &mut self.scratch,
         );
+        problem.hold_normal = known.is_some();
+        problem.prior = known.is_none();
         if robust {
             problem.trust(&self.kept);
             // Far from the minimum every sample is an outlier: the loss first takes the residuals for noise.
@@ -100,7 +110,7 @@ impl<M: Model, const ISA: Isa, const C: usize, const P: usize> FitGroup for Join
         // A lobe of magnitude 0 gives its shape no gradient, so a fit that comes there cannot leave. From the normal that it
         // found the grid of shapes may show a better lobe.
         let trapped = wanted & !solution.magnitudes.specular[0].positive();
-        if M::LOBES > 0 && trapped.any() {
+        if M::LOBES > 0 && known.is_none() && trapped.any() {
             let again = start::<M, ISA>(&[outcome.point.normal], &self.grey, illuminations, &optics, ambient);
             let retried = minimise(&mut problem, &again, trapped, self.options.max_steps);
             let better = retried.cost.lt(solution.quadratic.cost) & trapped;

@@ -116,7 +116,7 @@ fn instructions() -> &'static str {
 #[pyfunction]
 #[pyo3(signature = (model, radiance, *, scale, offset, light_direction, light_position_mm, light_intensity,
     view_direction, camera_distance_mm, position_mm, light_rgb, clip_level, shadow_level, sample_mask, noise, index,
-    fresnel, loss, loss_scale, max_steps, paper=None))]
+    fresnel, loss, loss_scale, max_steps, paper=None, normal=None))]
 #[allow(clippy::too_many_arguments)]
 fn fit<'py>(
     py: Python<'py>,
@@ -141,10 +141,11 @@ fn fit<'py>(
     loss_scale: f32,
     max_steps: usize,
     paper: Option<(f64, f64, bool, Option<[f64; 3]>)>,
+    normal: Option<[f64; 3]>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (name, ambient) = parse_model(model)?;
     let optics = parse_optics(index, fresnel)?;
-    let options = Options { optics, loss: parse_loss(loss, loss_scale)?, max_steps, ambient };
+    let options = Options { optics, loss: parse_loss(loss, loss_scale)?, max_steps, ambient, normal };
     let as_u16 = radiance.extract::<PyReadonlyArray3<u16>>().ok();
     let as_f32 = radiance.extract::<PyReadonlyArray3<f32>>().ok();
     let (shape, samples) = match (&as_u16, &as_f32) {

@@ -48,6 +48,8 @@ pub struct Separable<'a, M, const ISA: Isa, const C: usize, const P: usize> {
     loss: Loss,
     pub ambient: bool,
     pub channels: usize,
+    /// Whether the normal keeps its place.
+    pub hold_normal: bool,
     /// Specular magnitude where it is known beforehand, as one value for a whole sample.
     pub fixed_specular: Option<[Lane<ISA>; MAX_LOBES]>,
     /// Whether weak priors stand in for highlights that no light has shown.
@@ -158,6 +160,7 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
             ambient,
             channels: group.channels,
             fixed_specular: None,
+            hold_normal: false,
             prior: true,
             noise_scale: Lane::splat(1.0),
             trial_noise_scale: Lane::splat(1.0),
@@ -191,7 +194,10 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
     /// The basis functions at a point, with their derivatives by (tangent, tangent, ln shape …).
     #[inline(always)]
     fn evaluate_basis(&mut self, point: &Point<ISA>) {
-        let (first, second) = tangents(point.normal);
+        let (mut first, mut second) = tangents(point.normal);
+        if self.hold_normal {
+            (first, second) = ([Lane::splat(0.0); 3], [Lane::splat(0.0); 3]);
+        }
         let normal = array!(|i| {
             let mut component = Dual::constant(point.normal[i]);
             component.derivative[0] = first[i];

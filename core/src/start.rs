@@ -251,6 +251,30 @@ fn start_inline<M: Model, const ISA: Isa>(
     best
 }
 
+/// The best shape of the model's grid at a normal that is known, diffuse term and lobe alike.
+#[inline(always)]
+pub fn start_at<M: Model, const ISA: Isa>(
+    normal: [Lane<ISA>; 3],
+    grey: &[Grey<ISA>],
+    illuminations: &[Illumination<Lane<ISA>>],
+    optics: &Optics,
+    ambient: bool,
+) -> Point<ISA> {
+    let mut best_cost = Lane::splat(f64::from(f32::MAX));
+    let mut best = Point { normal, shape_log: [Lane::splat(0.0); MAX_SHAPE] };
+    for shape in M::STARTS {
+        let shape_log: [Lane<ISA>; MAX_SHAPE] = array!(|i| Lane::splat(shape[i].max(1e-6).ln()));
+        let cost = outlined::<ISA, _>(
+            #[inline(always)]
+            || one_normal_cost::<M, ISA>(normal, &shape_log, grey, illuminations, optics, ambient),
+        );
+        let better = cost.lt(best_cost);
+        best_cost = Lane::select(better, cost, best_cost);
+        best.shape_log = array!(|i| Lane::select(better, shape_log[i], best.shape_log[i]));
+    }
+    best
+}
+
 #[inline(always)]
 fn product<const ISA: Isa, const N: usize>(a: &[Lane<ISA>; N], b: &[Lane<ISA>; N]) -> Lane<ISA> {
     let mut sum = Lane::splat(0.0);

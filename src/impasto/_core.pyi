@@ -29,6 +29,7 @@ def fit(
     loss_scale: float,
     max_steps: int,
     paper: tuple[float, float, bool, tuple[float, float, float] | None] | None = None,
+    normal: tuple[float, float, float] | None = None,
 ) -> dict[str, NDArray[Any]]: ...
 def render(
     model: str,

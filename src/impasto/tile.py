@@ -50,6 +50,7 @@ def fit_tile(
     position_mm: NDArray[np.float32] | None = None,
     options: FitOptions | None = None,
     paper: Sample | None = None,
+    normal: tuple[float, float, float] | None = None,
 ) -> stores.Maps:
     """Fit a model to pixels: by the joint procedure, or by the paper's for a sample.
 
@@ -73,6 +74,9 @@ def fit_tile(
     options : FitOptions, optional
     paper : Sample, optional
         What holds for the whole sample, for the paper's procedure; its arm sweeps the XZ plane.
+    normal : tuple of float, optional
+        Unit normal of all pixels, for a sample known to be flat: it is held by the joint procedure, which then
+        assumes nothing of the material either.
 
     Returns
     -------
@@ -106,6 +110,7 @@ def fit_tile(
         loss_scale=options.loss_scale,
         max_steps=options.max_steps,
         paper=None if paper is None else (paper.threshold, paper.specular, paper.refined, paper.peak),
+        normal=normal,
     )
     for ending in ("", "_sd"):
         if f"specular{ending}" not in result:

@@ -69,15 +69,16 @@ impl Distribution for GeneralisedTrowbridgeReitz {
         ECCENTRICITY,
         ShapeParameter {
             name: "exponent",
-            lower: 0.2,
-            upper: 10.0,
+            lower: 0.1,
+            upper: 300.0,
             prior: (2.0, 0.7),
-            meaning: "of the distribution of facets: 2 is Trowbridge-Reitz, less has longer tails",
+            meaning: "of the facets' distribution: 2 is Trowbridge-Reitz, less has longer tails, many is a Gaussian",
         },
     ];
     const TITLE: &'static str = "generalised Trowbridge-Reitz facets";
     const CITATION: &'static str = "Burley2012";
     const STARTS: &'static [[f64; super::MAX_SHAPE]] = &[
+        [0.08, 0.35, 0.0],
         [0.02, 0.9, 0.0],
         [0.06, 0.9, 0.0],
         [0.2, 0.9, 0.0],
@@ -86,6 +87,8 @@ impl Distribution for GeneralisedTrowbridgeReitz {
         [0.25, 2.0, 0.0],
         [0.5, 2.5, 0.0],
         [0.9, 3.0, 0.0],
+        // Nearly Gaussian.
+        [0.8, 12.0, 0.0],
     ];
 
     #[inline(always)]

@@ -24,7 +24,7 @@ use crate::number::Number;
 pub const MAX_LOBES: usize = 1;
 pub const MAX_SHAPE: usize = 3;
 /// The largest number of shapes that a fit starts from.
-pub const MAX_STARTS: usize = 8;
+pub const MAX_STARTS: usize = 10;
 
 /// The basis functions of a model at one light.
 #[derive(Clone, Copy, Debug)]
