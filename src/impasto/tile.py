@@ -75,8 +75,8 @@ def fit_tile(
     paper : Sample, optional
         What holds for the whole sample, for the paper's procedure; its arm sweeps the XZ plane.
     normal : tuple of float, optional
-        Unit normal of all pixels, for a sample known to be flat: it is held by the joint procedure, which then
-        assumes nothing of the material either.
+        Unit normal of all pixels, for a sample known to be flat: it is held by the joint procedure, which
+        then assumes nothing of the material either.
 
     Returns
     -------
