@@ -102,6 +102,15 @@ def test_drawn_regions_and_pixels_are_read_and_mapped(painting, tmp_path):
         assert (tmp_path / "maps" / f"gloss_{angle}.png").is_file()
 
 
+def test_a_matte_model_reads_as_a_diffuser():
+    pixels = flat_pixels("lambert", 1.0, albedo=0.5)
+    pixels = Pixels(**{**vars(pixels), "shape": np.empty((1, 0)), "specular": np.empty((1, 0))})
+    for meter in GLOSSMETERS:
+        expected = 0.5 * meter.measure(lambda light, view: light[:, 2])
+        assert PixelGloss(pixels.model, OPTICS, meter)(pixels)[0] == pytest.approx(expected, rel=1e-3)
+        assert region_gloss(pixels, meter) == pytest.approx(expected, rel=1e-3)
+
+
 def test_all_pixels_outside_are_named_at_once(painting):
     with pytest.raises(OptionError) as error:
         impasto.gloss(painting, model="phong", pixels=[(0, 0), (-1, 2), (5, 10_000)])

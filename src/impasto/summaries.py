@@ -153,7 +153,8 @@ def gonio_table(summary: GonioSummary) -> tuple[Row, list[Row]]:
     for curve in summary.curves:
         for name, model in curve.models.items():
             errors = ["no light" if e is None else f"{100 * e:+.2f} %" for e in model.signed_error.values()]
-            rows.append((curve.name, name, f"{curve.half_width_deg:.1f}°", *errors))
+            width = "none" if math.isnan(curve.half_width_deg) else f"{curve.half_width_deg:.1f}°"
+            rows.append((curve.name, name, width, *errors))
     return ("model − measured", "model", "half-width", "peak", "shoulder", "rest"), rows
 
 

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from itertools import product
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,7 @@ _PREVIEW_PX = 1600
 _SAMPLED = 20_000
 """Pixels of a region whose normals the reading of the region integrates over."""
 
-_GRID = {0: 1, 1: 64, 2: 24, 3: 10}
+_GRID = {0: 0, 1: 64, 2: 24, 3: 10}
 """Values of each shape parameter in the table for single pixels, by the number of parameters."""
 
 
@@ -226,7 +227,7 @@ class PixelGloss:
         light, view, weight = meter.rays(quadrature(13, 4))
         normal = np.broadcast_to([0.0, 0.0, 1.0], light.shape)
         table = []
-        for values in np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes)):
+        for values in product(*axes):
             diffuse, specular = basis(
                 model,
                 normal,
