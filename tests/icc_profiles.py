@@ -44,7 +44,7 @@ def old_description(text):
     return b"desc\0\0\0\0" + struct.pack(">I", len(encoded)) + encoded + b"\0" * 79
 
 
-def profile(tags, space=b"RGB ", name="test profile", version=b"\x04\x40\0\0"):
+def profile(tags, space=b"RGB ", name="test profile", version=b"\x04\x40\0\0", pcs=b"XYZ "):
     """Return a profile of the given tags; the description, white and colorants are added."""
     tags = {b"desc": description(name), b"cprt": description("none"), **tags}
     for tag, xyz in _COLORANTS.items():
@@ -57,7 +57,7 @@ def profile(tags, space=b"RGB ", name="test profile", version=b"\x04\x40\0\0"):
         table += struct.pack(">4sII", tag, at + len(data), len(content))
         data += content
     body = struct.pack(">I", len(tags)) + table + data
-    header = struct.pack(">I4s4s4s4s4s", 128 + len(body), b"none", version, b"mntr", space, b"XYZ ")
+    header = struct.pack(">I4s4s4s4s4s", 128 + len(body), b"none", version, b"mntr", space, pcs)
     header += struct.pack(">6H", 2000, 1, 1, 0, 0, 0) + b"acsp"
     header += b"\0" * 28 + fixed(0.9642, 1.0, 0.8249)
     return header.ljust(128, b"\0") + body
@@ -71,3 +71,17 @@ def rgb(red, green=None, blue=None, **options):
 def grey(curve, **options):
     """Return a grey profile with the given tone curve."""
     return profile({b"kTRC": curve}, space=b"GRAY", **options)
+
+
+def tables(to_pcs, from_pcs, grid=17):
+    """Return an RGB profile of look-up tables, from drive to encoded Lab (0 to 1) and back."""
+    return profile({b"A2B0": _table(to_pcs, grid), b"B2A0": _table(from_pcs, grid)}, pcs=b"Lab ")
+
+
+def _table(function, grid):
+    axis = np.linspace(0, 1, grid)
+    corners = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    codes = np.rint(np.clip(function(corners), 0, 1) * 65535).astype(">u2")
+    straight = np.array([0, 65535] * 3, ">u2").tobytes()
+    head = b"mft2\0\0\0\0" + bytes([3, 3, grid, 0]) + fixed(1, 0, 0, 0, 1, 0, 0, 0, 1)
+    return head + struct.pack(">HH", 2, 2) + straight + codes.tobytes() + straight

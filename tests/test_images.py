@@ -8,8 +8,9 @@ import tifffile
 
 from impasto import icc
 from impasto.colour import decode_srgb
+from impasto.colour.profiles import profile
 from impasto.errors import OutputError
-from impasto.images import profile, write_exr, write_png, write_tiff
+from impasto.images import write_exr, write_png, write_tiff
 
 
 def oiio_read(path, kind):

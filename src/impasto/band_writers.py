@@ -16,18 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.colour import quantise
+from impasto.colour.profiles import profile
 from impasto.errors import OutputError
-from impasto.images import profile
 from impasto.output import output_error, partial_path, written_whole
 
 _TIFF_STRIP_ROWS = 64
+_DTYPES = {".exr": "float", ".png": "uint8", ".tif": "uint16"}
 
 
 class BandWriter:
-    """Write an EXR or a PNG file from bands of rows, top to bottom.
+    """Write an EXR, PNG or TIFF file from bands of rows, top to bottom.
 
-    The type of the samples follows from the file's ending: .exr holds float32 as given; .png holds 8 bits of
-    sRGB, with an ICC profile, from values that are encoded already (0 to 1).
+    The type of the samples follows from the file's ending: .exr holds float32 as given; .png holds 8 bits and
+    .tif 16, from values that are encoded already (0 to 1).
 
     Parameters
     ----------
@@ -39,6 +40,8 @@ class BandWriter:
         Their names: ``("R", "G", "B")``, or one.
     description : str, optional
         What the picture shows; kept in the file.
+    icc_profile : bytes, optional
+        What encoded values mean; none for data that are not colours.
 
     Raises
     ------
@@ -53,22 +56,23 @@ class BandWriter:
         width: int,
         channels: Sequence[str],
         description: str = "",
+        icc_profile: bytes | None = None,
     ) -> None:
         import OpenImageIO as oiio
 
         self.path = Path(path)
         self._height = height
         self._row = 0
-        self._display = self.path.suffix.lower() == ".png"
-        spec = oiio.ImageSpec(width, height, len(channels), "uint8" if self._display else "float")
+        self._dtype = _DTYPES[self.path.suffix.lower()]
+        spec = oiio.ImageSpec(width, height, len(channels), self._dtype)
         spec.channelnames = tuple(channels)
         spec.attribute("Software", "impasto")
         if description:
             spec.attribute("ImageDescription", description)
-        if self._display:
-            data = profile("srgb", grey=len(channels) == 1)
-            spec.attribute("ICCProfile", f"uint8[{len(data)}]", np.frombuffer(data, np.uint8))
-        else:
+        if icc_profile is not None:
+            data = np.frombuffer(icc_profile, np.uint8)
+            spec.attribute("ICCProfile", f"uint8[{len(data)}]", data)
+        if self._dtype != "uint8":
             spec.attribute("compression", "zip")
             spec.attribute("DateTime", "")
         self._temporary = partial_path(self.path)
@@ -84,7 +88,7 @@ class BandWriter:
         Parameters
         ----------
         band : ndarray of shape (rows, W, C), float32
-            Linear values for EXR, sRGB values from 0 to 1 for PNG.
+            Linear values for EXR, encoded ones from 0 to 1 for the others.
 
         Raises
         ------
@@ -92,7 +96,8 @@ class BandWriter:
             If the disk refuses them.
         """
         stop = self._row + band.shape[0]
-        pixels = quantise(band) if self._display else np.ascontiguousarray(band, dtype=np.float32)
+        exact = self._dtype == "float"
+        pixels = np.ascontiguousarray(band, np.float32) if exact else quantise(band, self._dtype)
         if not self._output.write_scanlines(self._row, stop, 0, pixels):
             raise self._failed()
         self._row = stop

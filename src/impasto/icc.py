@@ -1,8 +1,8 @@
-"""Read the tone curves and the name of an ICC profile.
+"""Read the tone curves, the name and the kind of an ICC profile.
 
-Only what linearisation needs: profiles of the matrix/TRC and grey kinds hold one curve per channel from
-device value to linear light [ICC.1:2022]_. Profiles that hold look-up tables mix the channels; they are
-refused here, because a table per channel cannot stand for them.
+Only what linearisation and display need: profiles of the matrix/TRC and grey kinds hold one curve per channel
+from device value to linear light [ICC.1:2022]_. Profiles that hold look-up tables mix the channels; no curves
+are read from them, because a table per channel cannot stand for them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 Curve = Callable[[Array], Array]
 
 _HEADER_BYTES = 128
-_CURVE_TAGS = {b"GRAY": (b"kTRC",), b"RGB ": (b"rTRC", b"gTRC", b"bTRC")}
+_CURVE_TAGS = {"GRAY": (b"kTRC",), "RGB": (b"rTRC", b"gTRC", b"bTRC")}
 # Number of s15Fixed16 parameters of each function type of parametricCurveType.
 _PARAMETER_COUNT = {0: 1, 1: 3, 2: 4, 3: 5, 4: 7}
 
@@ -39,6 +39,24 @@ def description(profile: bytes) -> str:
         length, offset = struct.unpack_from(">II", tag, 20)
         text = tag[offset : offset + length].decode("utf-16-be", errors="replace")
     return text.strip("\0 ") or "unnamed"
+
+
+def colour_space(profile: bytes) -> str:
+    """Return the colours that a profile describes, such as ``RGB``, ``GRAY`` or ``CMYK``."""
+    return profile[16:20].decode("latin-1").strip()
+
+
+def has_tables(profile: bytes) -> bool:
+    """Tell whether a profile describes its device by look-up tables instead of a matrix and tone curves."""
+    return any(name.startswith(b"A2B") or name.startswith(b"B2A") for name in _tags(profile))
+
+
+def numbers(profile: bytes, tag: str) -> Array | None:
+    """Return the numbers of a tag such as ``wtpt`` or ``chad``, None where the profile has no such tag."""
+    data = _tags(profile).get(tag.encode("latin-1"))
+    if data is None or data[:4] not in (b"XYZ ", b"sf32"):
+        return None
+    return np.frombuffer(data, ">i4", offset=8).astype(np.float64) / 65536
 
 
 def curves(profile: bytes, values: Array) -> Array:
@@ -66,10 +84,9 @@ def curves(profile: bytes, values: Array) -> Array:
     [ICC.1:2022]_ sections 8.3, 8.4 and 10.6, 10.18.
     """
     tags = _tags(profile)
-    space = profile[16:20]
-    names = _CURVE_TAGS.get(space)
+    names = _CURVE_TAGS.get(colour_space(profile))
     if names is None:
-        raise ValueError(f"it describes the colour space {space.decode('latin-1').strip()}, not grey or RGB")
+        raise ValueError(f"it describes the colour space {colour_space(profile)}, not grey or RGB")
     if any(name not in tags for name in names):
         raise ValueError("it holds look-up tables instead of one tone curve per channel")
     return np.stack([_curve(tags[name])(values) for name in names], axis=1)

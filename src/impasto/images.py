@@ -8,62 +8,24 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto.colour import decode_srgb
+from impasto.colour.profiles import ProfileName, profile
 from impasto.output import written_whole
 
-ProfileName = Literal["srgb", "linear"]
 Compression = Literal["deflate", "lzw", "zstd", "none"]
 
-# An ICC profile says when it was made; a fixed date keeps equal pictures equal byte for byte.
-_PROFILE_DATE = np.array([2000, 1, 1, 0, 0, 0], dtype=">u2").tobytes()
-# CIE xy of sRGB's white and of its red, green and blue primaries [IEC61966-2-1]_.
-_WHITE = (0.3127, 0.3290)
-_PRIMARIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06)
-_D50 = (0.3457, 0.3585)
 _TIFF_STRIP_ROWS = 64
 _JPEG_QUALITY = 95
 _CHANNEL_NAMES = {1: ("Y",), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
 
 
-@cache
-def profile(name: ProfileName, grey: bool = False) -> bytes:
-    """Return an ICC profile with sRGB's primaries and white.
-
-    Parameters
-    ----------
-    name : {'srgb', 'linear'}
-        The tone curve: sRGB's, or a straight line.
-    grey : bool
-        Whether the profile is for pictures of one channel.
-    """
-    import imagecodecs
-
-    if grey:
-        curve = None if name == "linear" else _srgb_curve()
-        # The white of a grey profile is that of the connection space, D50, or it would be adapted twice.
-        made = imagecodecs.cms_profile(
-            "gray", whitepoint=_D50, gamma=1.0 if curve is None else None, transferfunction=curve
-        )
-    elif name == "srgb":
-        made = imagecodecs.cms_profile("srgb")
-    else:
-        made = imagecodecs.cms_profile("rgb", whitepoint=_WHITE, primaries=_PRIMARIES, gamma=1.0)
-    return bytes(made[:24] + _PROFILE_DATE + made[36:])
-
-
-def _srgb_curve() -> NDArray[np.uint16]:
-    return np.rint(decode_srgb(np.linspace(0, 1, 4096)) * 65535).astype(np.uint16)
-
-
 def write_png(
-    path: str | os.PathLike[str], image: NDArray[Any], profile_name: ProfileName | None = "srgb"
+    path: str | os.PathLike[str], image: NDArray[Any], icc_profile: ProfileName | bytes | None = "srgb"
 ) -> None:
     """Write a PNG file of 8 or 16 bits.
 
@@ -72,8 +34,8 @@ def write_png(
     path : path
     image : ndarray of shape (H, W) or (H, W, 1 or 3), uint8 or uint16
         Codes as they are to stand in the file; `impasto.colour.quantise` makes them from an `image_srgb`.
-    profile_name : {'srgb', 'linear'} or None
-        Profile to embed; None for data that are not colours.
+    icc_profile : {'srgb', 'linear'}, bytes or None
+        Profile to embed, by name or as it is; None for data that are not colours.
 
     Raises
     ------
@@ -82,7 +44,7 @@ def write_png(
     """
     image = _checked(image, (np.uint8, np.uint16))
     attributes: dict[str, Any] = {"png:compressionLevel": 4}
-    _write_with_oiio(path, image, "png", str(image.dtype), None, profile_name, attributes)
+    _write_with_oiio(path, image, "png", str(image.dtype), None, icc_profile, attributes)
 
 
 def write_exr(
@@ -119,7 +81,7 @@ def write_exr(
 def write_tiff(
     path: str | os.PathLike[str],
     image: NDArray[Any],
-    profile_name: ProfileName | None = None,
+    icc_profile: ProfileName | bytes | None = None,
     compression: Compression = "deflate",
 ) -> None:
     """Write a TIFF file of 8 or 16 bits or of 32-bit floats.
@@ -128,8 +90,8 @@ def write_tiff(
     ----------
     path : path
     image : ndarray of shape (H, W) or (H, W, 1 or 3), uint8, uint16 or float32
-    profile_name : {'srgb', 'linear'}, optional
-        Profile to embed; None for data that are not colours.
+    icc_profile : {'srgb', 'linear'} or bytes, optional
+        Profile to embed, by name or as it is; None for data that are not colours.
     compression : {'deflate', 'lzw', 'zstd', 'none'}, optional
         How the samples are packed, without loss; the first two with a predictor, zstd for speed without.
 
@@ -150,7 +112,7 @@ def write_tiff(
             compression=None if compression == "none" else compression,
             predictor=compression in ("deflate", "lzw"),
             rowsperstrip=_TIFF_STRIP_ROWS,
-            iccprofile=None if profile_name is None else profile(profile_name, grey),
+            iccprofile=_profile_bytes(icc_profile, grey),
             metadata=None,
             software="impasto",
         )
@@ -188,13 +150,17 @@ def _checked(image: NDArray[Any], dtypes: Sequence[type]) -> NDArray[Any]:
     return image
 
 
+def _profile_bytes(icc_profile: ProfileName | bytes | None, grey: bool) -> bytes | None:
+    return profile(icc_profile, grey) if isinstance(icc_profile, str) else icc_profile
+
+
 def _write_with_oiio(
     path: str | os.PathLike[str],
     image: NDArray[Any],
     format_name: str,
     kind: str,
     channel_names: Sequence[str] | None,
-    profile_name: ProfileName | None,
+    icc_profile: ProfileName | bytes | None,
     attributes: dict[str, Any],
 ) -> None:
     import OpenImageIO as oiio
@@ -207,8 +173,8 @@ def _write_with_oiio(
     spec.channelnames = tuple(names)
     for key, value in attributes.items():
         spec.attribute(key, value)
-    if profile_name is not None:
-        data = profile(profile_name, channels == 1)
+    data = _profile_bytes(icc_profile, channels == 1)
+    if data is not None:
         spec.attribute("ICCProfile", f"uint8[{len(data)}]", np.frombuffer(data, np.uint8))
     with written_whole(Path(path)) as temporary:
         output = oiio.ImageOutput.create(format_name)

@@ -6,7 +6,6 @@ A transfer function is named by a short text that goes into the store and the su
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -48,7 +47,7 @@ def encode_srgb(image_linear: NDArray[np.floating], exposure: float = 1.0) -> ND
     """Return sRGB values for display.
 
     Values that the display cannot show are moved to the nearest that it can, and missing ones (NaN) become
-    black; `display_range` counts both, so that a picture never hides them.
+    black; `impasto.colour.rendition` counts both, so that a picture never hides them.
 
     Parameters
     ----------
@@ -71,59 +70,6 @@ def encode_srgb(image_linear: NDArray[np.floating], exposure: float = 1.0) -> ND
     power = 1.055 * linear ** (1 / 2.4) - 0.055
     encoded: NDArray[Any] = np.where(linear <= _SRGB_BREAK_LINEAR, 12.92 * linear, power)
     return encoded
-
-
-@dataclass(frozen=True)
-class DisplayRange:
-    """How many samples of a picture the display cannot show as they are.
-
-    Parameters
-    ----------
-    below : int
-        Samples under 0, shown as 0: outside the display's gamut.
-    above : int
-        Samples over 1, shown as 1.
-    missing : int
-        Samples that are NaN, shown as 0.
-    total : int
-        All samples.
-    """
-
-    below: int
-    above: int
-    missing: int
-    total: int
-
-    def __str__(self) -> str:
-        parts = [
-            f"{100 * count / self.total:.2g} % {word}"
-            for count, word in (
-                (self.above, "too bright for the display"),
-                (self.below, "outside its gamut"),
-                (self.missing, "missing"),
-            )
-            if count
-        ]
-        return ", ".join(parts) or "all within the display's range"
-
-
-def display_range(image_linear: NDArray[np.floating], exposure: float = 1.0) -> DisplayRange:
-    """Count the samples that `encode_srgb` has to move into the display's range.
-
-    Parameters
-    ----------
-    image_linear : ndarray of any shape
-        Relative radiance.
-    exposure : float
-        Factor on the radiance.
-    """
-    image_linear = np.asarray(image_linear)
-    return DisplayRange(
-        below=int(np.count_nonzero(image_linear * exposure < 0.0)),
-        above=int(np.count_nonzero(image_linear * exposure > 1.0)),
-        missing=int(np.count_nonzero(np.isnan(image_linear))),
-        total=image_linear.size,
-    )
 
 
 def quantise(image_srgb: NDArray[np.floating], dtype: DTypeLike = np.uint8) -> NDArray[np.unsignedinteger]:
