@@ -5,14 +5,20 @@ import sys
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+import tifffile
 from PIL import Image
 
 import impasto
 from impasto.colour import encode_srgb
+from impasto.colour.adaptation import WHITE_POINTS, xy_to_xyz
+from impasto.colour.displays import display_p3
+from impasto.colour.primaries import SRGB, rgb_to_xyz_matrix
+from impasto.colour.rendition import Rendition
 from impasto.errors import OptionError, OutputError, StoreError
 from impasto.geometry import Lights
 from impasto.render import _band_rows, render_bands
 from impasto.store import open_fit, open_stack
+from impasto.summaries import render_lines
 
 MODEL = "torrance-sparrow"
 
@@ -150,3 +156,82 @@ def test_what_cannot_be_rendered_is_told_before_anything_is_written(painting, tm
     out.write_text("a file")
     with pytest.raises(OutputError, match="is a file"):
         impasto.render(painting, model=MODEL, light=[(20, 0)], out=out)
+
+
+def test_a_rendering_for_another_display_carries_its_profile(painting, tmp_path):
+    """Display P3 pictures, 16 bits in TIFF, and the same through the profile in a file."""
+    profile = tmp_path / "monitor.icc"
+    profile.write_bytes(display_p3().profile)
+    for name, display in (("named", "display-p3"), ("filed", profile)):
+        summary = impasto.render(
+            painting, model=MODEL, light=[(40, 120)], out=tmp_path / name, display=display, tiff=True
+        )
+    assert summary.files[1].name == "1.tif"
+    named = tifffile.imread(tmp_path / "named" / "1.tif")
+    assert named.dtype == np.uint16
+    linear = read(tmp_path / "named" / "1.exr")
+    expected = Rendition(display_p3())(linear).drive
+    np.testing.assert_allclose(named / 65535, expected, atol=1e-4)
+    np.testing.assert_allclose(tifffile.imread(tmp_path / "filed" / "1.tif") / 65535, expected, atol=2e-3)
+    for name in ("named", "filed"):
+        with tifffile.TiffFile(tmp_path / name / "1.tif") as file:
+            assert file.pages[0].iccprofile == profile.read_bytes()
+
+
+def test_what_the_display_cannot_show_is_counted_and_masked(painting, tmp_path):
+    summary = impasto.render(
+        painting,
+        model=MODEL,
+        light=[(40, 120)],
+        out=tmp_path,
+        exposure=6.0,
+        white_point="A",
+        highlights="shoulder",
+        gamut_mask=True,
+    )
+    white = xy_to_xyz(WHITE_POINTS["A"])
+    shown = Rendition(exposure=6.0, white_xyz=white, highlights="shoulder")(read(tmp_path / "1.exr"))
+    np.testing.assert_array_equal(read(tmp_path / "1.png"), np.rint(shown.drive * 255))
+    mask = read(tmp_path / "1_gamut.png")[..., 0]
+    np.testing.assert_array_equal(mask == 170, shown.too_bright)
+    np.testing.assert_array_equal(mask == 255, shown.outside)
+    assert summary.too_bright == shown.too_bright.mean() > 0
+    assert summary.out_of_gamut == shown.outside.mean() > 0
+    assert summary.white_xy == pytest.approx(WHITE_POINTS["A"])
+    lines = "\n".join(render_lines(summary))
+    assert "soft shoulder" in lines
+    assert "outside the display's gamut" in lines
+
+
+def test_the_light_can_be_the_white(painting, tmp_path):
+    light = open_stack(painting).light_rgb
+    given, named = (
+        impasto.render(painting, model=MODEL, light=[(40, 0)], out=tmp_path, white_point=white)
+        for white in ((0.3127, 0.329), "light")
+    )
+    xyz = rgb_to_xyz_matrix(SRGB) @ light
+    assert named.white_xy == pytest.approx(tuple(xyz[:2] / xyz.sum()))
+    assert given.white_xy == pytest.approx((0.3127, 0.329))
+
+
+def test_display_options_that_cannot_be_used_are_told_together(painting, tmp_path):
+    with pytest.raises(OptionError) as raised:
+        impasto.render(
+            painting,
+            model=MODEL,
+            light=[(20, 0)],
+            out=tmp_path / "out",
+            display="cinema",
+            exposure=-1,
+            white_point="moon",
+            adaptation="cat02",
+            highlights="bloom",
+        )
+    assert [problem.where for problem in raised.value.problems] == [
+        "--exposure -1",
+        "--adaptation cat02",
+        "--highlights bloom",
+        "--display cinema",
+        "--white-point moon",
+    ]
+    assert not (tmp_path / "out").exists()

@@ -265,9 +265,30 @@ def render(
             help="Light on the arm, degrees, or a sweep START:STOP:STEP; may be repeated.",
         ),
     ] = None,
+    display: Annotated[
+        str, typer.Option("--display", metavar="NAME|FILE", help="srgb, display-p3 or an ICC profile.")
+    ] = "srgb",
     exposure: Annotated[
         float, typer.Option("--exposure", metavar="N", help="Brighten the display pictures N times.")
     ] = 1.0,
+    white_point: Annotated[
+        str | None,
+        typer.Option(
+            "--white-point",
+            metavar="WHITE",
+            help="Shown as the display's white: D50 or another illuminant, x,y, or light.",
+        ),
+    ] = None,
+    adaptation: Annotated[
+        str, typer.Option("--adaptation", metavar="HOW", help="To that white: cat16 or bradford.")
+    ] = "cat16",
+    highlights: Annotated[
+        str, typer.Option("--highlights", metavar="RULE", help="Above the display's white: clip or shoulder.")
+    ] = "clip",
+    gamut_mask: Annotated[
+        bool, typer.Option("--gamut-mask", help="Write where the display cannot show the colour.")
+    ] = False,
+    tiff: Annotated[bool, typer.Option("--tiff", help="16-bit TIFF files instead of PNG.")] = False,
     raw: Annotated[bool, typer.Option("--raw", help="Write the linear EXR files only.")] = False,
     animate: Annotated[
         bool | None,
@@ -287,7 +308,13 @@ def render(
             light=[parse_light(text) for text in light or ()],
             arm=parse_angles(arm or ()),
             out=out,
+            display=display,
             exposure=exposure,
+            white_point=white_point,
+            adaptation=adaptation,
+            highlights=highlights,
+            gamut_mask=gamut_mask,
+            tiff=tiff,
             raw=raw,
             animate=animate,
         )

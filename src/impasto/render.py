@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 
 from impasto.animation import Animation
 from impasto.band_writers import BandWriter
-from impasto.colour import encode_srgb
-from impasto.errors import OptionError, Problem
+from impasto.colour.displays import Display
+from impasto.colour.rendition import Rendition, Shown
 from impasto.geometry import Camera, Lights
 from impasto.models import parse_model
 from impasto.output import prepare_folder
 from impasto.pixels import read_pixels, render_pixels
 from impasto.progress import progress
+from impasto.render_display import requested_rendition
 from impasto.render_lights import requested_lights
 from impasto.store import Fit, open_fit, open_stack
 
@@ -35,6 +36,11 @@ _BLOCK_ROWS = 256
 
 _LIGHTS_AT_A_TIME = 8
 _ANIMATED_FROM = 3
+
+_LETTERS = {1: ("Y",), 3: ("R", "G", "B")}
+
+# Codes of a gamut mask: shown as it is, missing, too bright, outside the gamut.
+_MISSING, _TOO_BRIGHT, _OUTSIDE = (np.float32(code / 255) for code in (85, 170, 255))
 
 
 @dataclass(frozen=True)
@@ -53,14 +59,24 @@ class RenderSummary:
         Every file written.
     animation : Path or None
         The animated picture of a sweep.
+    display : str
+        What the display pictures are made for.
+    camera_colour : str
+        Where the meaning of the stack's channels comes from.
     exposure : float
         Factor on the radiance in the display pictures; 1 shows relative radiance 1 as white.
+    white_xy : (float, float)
+        CIE xy of what is shown in the colour of the display's white.
+    adaptation, highlights : str
+        How colours follow from that white to the display's, and what happens to those above it.
     missing_pixels : int
         Pixels without a fit: NaN in the EXR files, black on display.
     matte_pixels : int
         Pixels of which the highlight is not identified, rendered with their diffuse term alone.
     too_bright : float
-        Largest share, over the lights, of samples that the display shows as white because they exceed it.
+        Largest share, over the lights, of pixels brighter than the display's white.
+    out_of_gamut : float
+        Largest share, over the lights, of other pixels whose colour the display cannot show.
     seconds : float
     """
 
@@ -69,10 +85,16 @@ class RenderSummary:
     lights: tuple[str, ...]
     files: tuple[Path, ...]
     animation: Path | None
+    display: str
+    camera_colour: str
     exposure: float
+    white_xy: tuple[float, float]
+    adaptation: str
+    highlights: str
     missing_pixels: int
     matte_pixels: int
     too_bright: float
+    out_of_gamut: float
     seconds: float
 
 
@@ -84,12 +106,18 @@ def render(
     light: Sequence[tuple[float, float]] = (),
     arm: Sequence[float] = (),
     out: str | PathLike[str],
+    display: str | PathLike[str] | Display = "srgb",
     exposure: float = 1.0,
+    white_point: str | tuple[float, float] | None = None,
+    adaptation: str = "cat16",
+    highlights: str = "clip",
+    gamut_mask: bool = False,
+    tiff: bool = False,
     raw: bool = False,
     animate: bool | None = None,
     show_progress: bool | None = None,
 ) -> RenderSummary:
-    """Render a fit under lights, as one linear EXR file and one sRGB picture per light.
+    """Render a fit under lights, as one linear EXR file and one picture for a display per light.
 
     Memory is bounded whatever the painting's size: about 0.5 GB for pictures of up to 20 000 columns.
 
@@ -107,8 +135,22 @@ def render(
         Arm angles, degrees.
     out : path
         Folder for the pictures, made if it is not there; pictures of the same names are replaced.
+    display : str, path or Display, optional
+        ``srgb``, ``display-p3``, or the file of an ICC profile.
     exposure : float, optional
-        Factor on the radiance in the display pictures. The EXR files are never scaled.
+        Factor on the radiance in the display pictures. The EXR files hold the camera's own, unscaled.
+    white_point : str or (float, float), optional
+        What is shown in the colour of the display's white: an illuminant such as ``D50``, CIE ``x,y``, or
+        ``light``; by default, the white that the camera's colours are calibrated for.
+    adaptation : {'cat16', 'bradford'}, optional
+        How colours follow from that white to the display's.
+    highlights : {'clip', 'shoulder'}, optional
+        What happens to colours brighter than the display's white; see `impasto.colour.rendition.Rendition`.
+    gamut_mask : bool, optional
+        Whether to write a grey picture per light, ``<name>_gamut.png``, that says where the display picture
+        is not what it should be: 85 missing, 170 too bright, 255 outside the display's gamut, else 0.
+    tiff : bool, optional
+        Whether the display pictures are TIFF files of 16 bits instead of PNG files of 8.
     raw : bool, optional
         Whether to write the EXR files only.
     animate : bool, optional
@@ -123,7 +165,7 @@ def render(
     Raises
     ------
     OptionError
-        If the model, a light or the exposure cannot be used.
+        If the model, a light or what the display pictures are asked for cannot be used.
     StoreError
         If there is no such store or no such complete fit.
     OutputError
@@ -131,10 +173,6 @@ def render(
     """
     started = time.perf_counter()
     spec = parse_model(model)
-    if not 0 < exposure < np.inf:
-        raise OptionError(
-            Problem(f"--exposure {exposure:g}", "is not above 0", "Give a factor such as 2 or 0.5")
-        )
     fit = open_fit(Path(store), spec.name)
     stack = open_stack(Path(store))
     _, height, width, channels = stack.shape
@@ -142,11 +180,22 @@ def render(
         wanted = lights
     else:
         wanted = requested_lights(lights, light, arm, channels, stack.camera)
+    rendition = requested_rendition(
+        stack,
+        display=display,
+        exposure=exposure,
+        white_point=white_point,
+        adaptation=adaptation,
+        highlights=highlights,
+    )
+    endings = ((".tif" if tiff else ".png"), *(("_gamut.png",) if gamut_mask else ()))
     folder = prepare_folder(out)
     animate = len(arm) >= _ANIMATED_FROM if animate is None else animate
-    animation = Animation(folder / f"{spec.name}.webp", height, width) if animate and not raw else None
+    animation = None
+    if animate and not raw:
+        animation = Animation(folder / f"{spec.name}.webp", height, width, rendition)
     files: list[Path] = []
-    too_bright = 0.0
+    too_bright = out_of_gamut = 0.0
     missing = matte = 0
     with progress("render", len(wanted) * height, show=show_progress) as advance:
         for first in range(0, len(wanted), _LIGHTS_AT_A_TIME):
@@ -154,7 +203,9 @@ def render(
             group = wanted.select(index)
             missing = matte = 0
             with (
-                _Pictures(folder, group.names, fit.shape, channels, spec.title, exposure, raw) as pictures,
+                _Pictures(
+                    folder, group.names, fit.shape, channels, spec.title, rendition, () if raw else endings
+                ) as pictures,
                 ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="encode") as encoders,
             ):
                 for band in render_bands(fit, group, stack.camera):
@@ -166,11 +217,12 @@ def render(
                     ]
                     for number, radiance in enumerate(band.radiance):
                         if animation:
-                            animation.add(first + number, band.rows, radiance, exposure)
+                            animation.add(first + number, band.rows, radiance)
                         done[number].result()
                         advance(radiance.shape[0])
             files += pictures.files
             too_bright = max(too_bright, pictures.too_bright)
+            out_of_gamut = max(out_of_gamut, pictures.out_of_gamut)
     if animation:
         animation.save()
         files.append(animation.path)
@@ -180,10 +232,16 @@ def render(
         lights=wanted.names,
         files=tuple(files),
         animation=animation.path if animation else None,
+        display=rendition.display.name,
+        camera_colour=rendition.camera.source,
         exposure=exposure,
+        white_xy=rendition.white_xy,
+        adaptation=adaptation,
+        highlights=highlights,
         missing_pixels=missing,
         matte_pixels=matte,
         too_bright=too_bright,
+        out_of_gamut=out_of_gamut,
         seconds=time.perf_counter() - started,
     )
 
@@ -198,39 +256,57 @@ class _Pictures(ExitStack):
         shape: tuple[int, int],
         channels: int,
         title: str,
-        exposure: float,
-        raw: bool,
+        rendition: Rendition,
+        endings: Sequence[str],
     ) -> None:
         super().__init__()
-        self._exposure = exposure
-        self._white = np.zeros(len(names))
-        self._samples = shape[0] * shape[1] * channels
-        letters = ("R", "G", "B") if channels == 3 else ("Y",)
+        self._rendition = rendition
+        self._pixels = shape[0] * shape[1]
+        self._too_bright, self._outside = np.zeros((2, len(names)))
 
         def writer(name: str, ending: str) -> BandWriter:
-            path = folder / f"{name}{ending}"
-            return self.enter_context(BandWriter(path, *shape, letters, f"{title}, light {name}"))
+            letters, icc_profile = {
+                ".exr": (_LETTERS[channels], None),
+                "_gamut.png": (_LETTERS[1], None),
+            }.get(ending, (_LETTERS[rendition.channels], rendition.profile))
+            return self.enter_context(
+                BandWriter(folder / f"{name}{ending}", *shape, letters, f"{title}, light {name}", icc_profile)
+            )
 
         try:
             self._linear = [writer(name, ".exr") for name in names]
-            self._display = [] if raw else [writer(name, ".png") for name in names]
+            self._display = [[writer(name, ending) for name in names] for ending in endings]
         except BaseException:
             self.__exit__(*sys.exc_info())
             raise
 
     @property
     def files(self) -> list[Path]:
-        return [writer.path for writer in (*self._linear, *self._display)]
+        return [writer.path for writers in (self._linear, *self._display) for writer in writers]
 
     @property
     def too_bright(self) -> float:
-        return float(self._white.max()) / self._samples
+        return float(self._too_bright.max()) / self._pixels
+
+    @property
+    def out_of_gamut(self) -> float:
+        return float(self._outside.max()) / self._pixels
 
     def write(self, light: int, radiance: NDArray[np.float32]) -> None:
         self._linear[light].write(radiance)
-        if self._display:
-            self._display[light].write(encode_srgb(radiance, self._exposure))
-            self._white[light] += np.count_nonzero(radiance * self._exposure > 1.0)
+        if not self._display:
+            return
+        shown = self._rendition(radiance)
+        for writers, values in zip(self._display, (shown.drive, _gamut_mask(shown)), strict=False):
+            writers[light].write(values)
+        self._too_bright[light] += np.count_nonzero(shown.too_bright)
+        self._outside[light] += np.count_nonzero(shown.outside)
+
+
+def _gamut_mask(shown: Shown) -> NDArray[np.float32]:
+    mask = np.zeros((*shown.missing.shape, 1), np.float32)
+    mask[shown.missing], mask[shown.too_bright], mask[shown.outside] = _MISSING, _TOO_BRIGHT, _OUTSIDE
+    return mask
 
 
 @dataclass(frozen=True)
