@@ -66,10 +66,10 @@ def read_luminance(folder: Path, names: list[str]) -> tuple[Array, Array]:
 
 def fit_rms(model: str, radiance: Array) -> Array:
     """Return RMS over mean of a model fitted to flat samples, shape (materials,)."""
+    from impasto.fit.procedure import FitOptions
+    from impasto.fit.tile import fit_tile
     from impasto.geometry import Camera, Lights, arm_direction
     from impasto.models import parse_model
-    from impasto.procedure import FitOptions
-    from impasto.tile import fit_tile
 
     peak = radiance.max(axis=0)
     scaled = (radiance / peak).astype(np.float32)[..., None]

@@ -23,10 +23,10 @@ WARM_UP = 4096
 
 def fit_core(problem: Problem) -> dict[str, Any]:
     """Return impasto's joint fit of the fixed problem."""
+    from impasto.fit.procedure import FitOptions
+    from impasto.fit.tile import fit_tile
     from impasto.geometry import Camera, Lights
     from impasto.models import parse_model
-    from impasto.procedure import FitOptions
-    from impasto.tile import fit_tile
 
     lights = Lights(tuple(str(i) for i in range(len(problem.light_direction))), problem.light_direction)
     fitted = fit_tile(

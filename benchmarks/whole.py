@@ -105,10 +105,10 @@ def _fit_memory(files: list[Path]) -> dict[str, float]:
     """Fit the first rows of the photographs from memory, tile by tile, on all cores."""
     import tifffile
 
+    from impasto.fit.procedure import FitOptions
+    from impasto.fit.tile import fit_tile
     from impasto.geometry import Camera, Lights
     from impasto.models import parse_model
-    from impasto.procedure import FitOptions
-    from impasto.tile import fit_tile
 
     rows = []
     for file in files:

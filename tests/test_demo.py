@@ -6,8 +6,8 @@ from html.parser import HTMLParser
 import pytest
 
 import impasto
+from impasto.demo.template import Picture, SummaryPage
 from impasto.errors import OutputError
-from impasto.summary_page import Picture, SummaryPage
 
 
 @pytest.fixture(scope="module")

@@ -2,15 +2,15 @@
 
 import multiprocessing
 import shutil
+import sys
 import time
 
 import numpy as np
 import pytest
 
 from impasto import store as stores
-from impasto import streaming
 from impasto.errors import ImpastoError, OptionError, StoreError
-from impasto.fit import FitOptions, fit
+from impasto.fit import FitOptions, fit, streaming
 from impasto.geometry import dome_direction
 from impasto.stack import stack
 from store_files import attributes, contents, flip_byte, largest_file, write_capture
@@ -46,7 +46,7 @@ def expected(stacked, tmp_path_factory):
     """Return what the store of `stacked` holds after a fit of `first_samples` that was not interrupted."""
     path = copy(stacked, tmp_path_factory.mktemp("expected") / "s.zarr")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("impasto.joint.fit_tile", tell_first_samples)
+        patch.setattr(sys.modules["impasto.fit.joint"], "fit_tile", tell_first_samples)
         fit(path, models=["lambert"])
     return contents(path)
 
@@ -76,7 +76,7 @@ def tell_first_samples(model, radiance, *, lights, **_):
 @pytest.fixture
 def first_samples(monkeypatch):
     """Replace the core by `tell_first_samples`."""
-    monkeypatch.setattr("impasto.joint.fit_tile", tell_first_samples)
+    monkeypatch.setattr(sys.modules["impasto.fit.joint"], "fit_tile", tell_first_samples)
 
 
 def whole(path):
@@ -164,7 +164,7 @@ def test_the_core_recovers_the_relief(small):
 def test_a_fit_that_is_there_is_not_computed_again(small, first_samples, monkeypatch):
     fit(small, models=["phong"])
     before = contents(small)
-    monkeypatch.setattr("impasto.joint.fit_tile", None)
+    monkeypatch.setattr(sys.modules["impasto.fit.joint"], "fit_tile", None)
     (again,) = fit(small, models=["phong"]).models
     assert again.already
     assert sum(again.pixels.values()) == 90 * 70
@@ -238,7 +238,7 @@ def test_an_interrupted_fit_is_not_continued_with_other_options(
 
 def test_an_error_of_the_core_stops_the_fit(stacked, tmp_path, monkeypatch):
     path = copy(stacked, tmp_path / "s.zarr")
-    monkeypatch.setattr("impasto.joint.fit_tile", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr(sys.modules["impasto.fit.joint"], "fit_tile", lambda *_, **__: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         fit(path, models=["lambert"])
     assert stores.fitted_models(path) == []
@@ -255,7 +255,7 @@ def test_a_full_disk_is_an_error_that_can_be_continued(stacked, expected, tmp_pa
 
 def test_room_is_checked_before_anything_is_fitted(small, monkeypatch):
     monkeypatch.setattr("shutil.disk_usage", lambda path: type("Usage", (), {"free": 1000}))
-    monkeypatch.setattr("impasto.joint.fit_tile", lambda *_, **__: pytest.fail("fitted"))
+    monkeypatch.setattr(sys.modules["impasto.fit.joint"], "fit_tile", lambda *_, **__: pytest.fail("fitted"))
     with pytest.raises(StoreError, match="MB free"):
         fit(small)
 

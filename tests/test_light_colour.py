@@ -9,8 +9,8 @@ import tifffile
 from impasto import store as stores
 from impasto.fit import fit
 from impasto.geometry import dome_direction, pixel_position_mm
-from impasto.highlights import separate
 from impasto.stack import stack
+from impasto.stack.highlights import separate
 from reference_models import radiance
 from store_files import attributes, noise_images, write_capture
 

@@ -14,10 +14,11 @@ from impasto.capture.simulate.measured import read_measured
 from impasto.cli import app
 from impasto.errors import OptionError
 from impasto.fit import FitOptions
+from impasto.fit.paper import Paper
+from impasto.fit.paper.crossing import Crossing
+from impasto.fit.paper.threshold import choose_threshold
 from impasto.geometry import Camera, direction_tilts, dome_direction
 from impasto.models import MODELS
-from impasto.paper.crossing import Crossing
-from impasto.paper.threshold import choose_threshold
 from store_files import attributes, contents
 
 MODEL = "torrance-sparrow"
@@ -281,12 +282,12 @@ def test_clipped_pixels_are_not_asked_for_the_peak(tmp_path):
 def test_an_interrupted_fit_goes_on_to_the_same_bytes(bumpy, monkeypatch):
     fitted(bumpy, LITERAL)
     expected = contents(bumpy.store)
-    conclude = impasto.paper.Paper.conclude
-    monkeypatch.setattr(impasto.paper.Paper, "conclude", lambda self, read: 1 / 0)
+    conclude = Paper.conclude
+    monkeypatch.setattr(Paper, "conclude", lambda self, read: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         fitted(bumpy, LITERAL)
     assert not attributes(bumpy.store / "fits" / MODEL)["complete"]
-    monkeypatch.setattr(impasto.paper.Paper, "conclude", conclude)
+    monkeypatch.setattr(Paper, "conclude", conclude)
     (done,) = impasto.fit(bumpy.store, models=[MODEL], procedure="paper").models
     assert done.continued
     assert contents(bumpy.store) == expected

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from impasto.pyramid import halve, halve_normal, halve_status
+from impasto.fit.pyramid import halve, halve_normal, halve_status
 
 
 def by_hand(values):

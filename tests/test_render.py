@@ -18,7 +18,7 @@ from impasto.errors import OptionError, OutputError, StoreError
 from impasto.geometry import Lights
 from impasto.render import _band_rows, render_bands
 from impasto.store import open_fit, open_stack
-from impasto.summaries import render_lines
+from impasto.summaries.render import render_lines
 
 MODEL = "torrance-sparrow"
 

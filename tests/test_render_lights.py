@@ -5,7 +5,7 @@ import pytest
 
 from impasto.errors import CaptureError, ImpastoError, OptionError
 from impasto.geometry import Camera, arm_direction, dome_direction
-from impasto.render_lights import parse_angles, parse_light, requested_lights
+from impasto.render.lights import parse_angles, parse_light, requested_lights
 
 CAMERA = Camera()
 

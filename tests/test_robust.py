@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from benchmarks.problem import NOISE, VIEW_DIRECTION, simulate
 
+from impasto.fit.joint import fit_tile
+from impasto.fit.procedure import FitOptions
 from impasto.geometry import Camera, Lights
-from impasto.joint import fit_tile
 from impasto.models import parse_model
-from impasto.procedure import FitOptions
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,8 @@ from impasto import store as stores
 from impasto.capture import Photograph, read_capture
 from impasto.colour import decode_srgb
 from impasto.errors import CaptureError, StoreError
-from impasto.linearise import Linearisation
 from impasto.stack import _decoders, stack
+from impasto.stack.linearise import Linearisation
 from store_files import attributes, contents, largest_file, noise_images, write_capture
 
 
@@ -71,7 +71,7 @@ def test_floats_are_kept_and_what_is_not_finite_is_missing(tmp_path):
 
 def test_each_channel_has_its_own_table(tmp_path, monkeypatch):
     table = np.linspace(0, 1, 256)[:, None] ** np.array([1, 2, 3])
-    monkeypatch.setattr("impasto.linearise.linearisation_table", lambda *_: table)
+    monkeypatch.setattr(sys.modules["impasto.stack.linearise"], "linearisation_table", lambda *_: table)
     photograph = photographs(tmp_path, np.uint8)[0]
     linearise = Linearisation(photograph, 250.0)
     band = np.random.default_rng(0).integers(0, 256, (130, 9, 3)).astype(np.uint8)

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from impasto.evaluate.gloss import gloss
     from impasto.evaluate.gonio import gonio
     from impasto.fit import fit
+    from impasto.fit.procedure import FitOptions
     from impasto.geometry import Camera, Lights
     from impasto.maps import maps
-    from impasto.procedure import FitOptions
     from impasto.render import render
     from impasto.stack import stack
     from impasto.store import open
@@ -52,7 +52,7 @@ __all__ = [
 # Where each name is found when it is asked for: a stage does not import what the others need.
 _HOME = {
     "Camera": "geometry",
-    "FitOptions": "procedure",
+    "FitOptions": "fit.procedure",
     "ImpastoError": "errors",
     "Lights": "geometry",
     "compare": "evaluate.compare",

@@ -15,7 +15,7 @@ from impasto.errors import OptionError, Problem
 from impasto.evaluate.criteria import is_highlight, misfit, unknowns
 from impasto.evaluate.regions import WHOLE, Regions, read_regions, sample_regions
 from impasto.images import write_tiff
-from impasto.map_pictures import draw_status
+from impasto.maps.pictures import draw_status
 from impasto.models import parse_model
 from impasto.output import prepare_folder
 from impasto.pixels import Pixels, luminance, read_pixels

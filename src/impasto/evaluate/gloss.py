@@ -19,7 +19,7 @@ from impasto.band_writers import BandWriter
 from impasto.evaluate.glossmeter import GLOSSMETERS, Glossmeter, quadrature
 from impasto.evaluate.regions import Sample, check_inside, read_regions, sample_regions
 from impasto.geometry import Array, Camera, Lights
-from impasto.map_pictures import draw_values
+from impasto.maps.pictures import draw_values
 from impasto.models import ModelSpec, basis, parse_model
 from impasto.output import prepare_folder
 from impasto.pixels import Pixels, read_pixels

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from impasto import store as stores
 from impasto.arm import find_arm
 from impasto.errors import OptionError, Problem, raise_problems
+from impasto.fit.procedure import Findings, FitOptions
+from impasto.fit.tile import fit_tile
 from impasto.geometry import pixel_position_mm
 from impasto.models import ModelSpec
-from impasto.procedure import Findings, FitOptions
-from impasto.tile import fit_tile
 
 _FOREIGN = {"refined": "paper", "threshold_deg": "paper", "highlight": "paper"}
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto.procedure import Procedure
+from impasto.fit.procedure import Procedure
 from impasto.store import STACK_CHUNK, Maps, Stack, Unit
 
 # A tile of the stack, all lights. With one tile read ahead, a few fitted ones waiting, and a unit of maps per

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from impasto.arm import Arm
-from impasto.paper.crossing import Crossing
-from impasto.paper.survey import Survey
-from impasto.paper.threshold import LEAST_DEG, MOST_DEG, NEGLIGIBLE
+from impasto.fit.paper.crossing import Crossing
+from impasto.fit.paper.survey import Survey
+from impasto.fit.paper.threshold import LEAST_DEG, MOST_DEG, NEGLIGIBLE
 
 
 def plane(arm: Arm, view_phi: float, refined: bool) -> tuple[str, ...]:

@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from impasto import store as stores
 from impasto.arm import find_arm
 from impasto.errors import OptionError, raise_problems
+from impasto.fit.paper import notes
+from impasto.fit.paper.brightest import Pixel, fit_brightest, specular_at_peak
+from impasto.fit.paper.crossing import Crossing, normal_reach
+from impasto.fit.paper.refusals import lights_needed, refusals
+from impasto.fit.paper.survey import Survey, survey
+from impasto.fit.paper.threshold import choose_threshold
+from impasto.fit.procedure import Findings, FitOptions
+from impasto.fit.tile import Sample, fit_tile
 from impasto.geometry import direction_tilts
 from impasto.models import MODELS, ModelSpec
-from impasto.paper import notes
-from impasto.paper.brightest import Pixel, fit_brightest, specular_at_peak
-from impasto.paper.crossing import Crossing, normal_reach
-from impasto.paper.refusals import lights_needed, refusals
-from impasto.paper.survey import Survey, survey
-from impasto.paper.threshold import choose_threshold
-from impasto.procedure import Findings, FitOptions
-from impasto.tile import Sample, fit_tile
 
 __all__ = ["Paper"]
 

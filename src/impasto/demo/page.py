@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 
 from impasto.colour import encode_srgb, quantise
 from impasto.console import versions
+from impasto.demo.template import Picture, SummaryPage
 from impasto.evaluate import EvaluateSummary
 from impasto.fit import FitSummary
 from impasto.maps import MapsSummary
 from impasto.render import RenderSummary
 from impasto.stack import StackSummary
 from impasto.store import open_fit, open_stack
-from impasto.summaries import evaluate_tables, percent, seconds
-from impasto.summary_page import Picture, SummaryPage
+from impasto.summaries.evaluate import evaluate_tables
+from impasto.summaries.words import percent, seconds
 
 _TITLES = {"torrance-sparrow": "Torrance-Sparrow", "phong": "Phong"}
 _SHOWN_MAPS = ("normal", "diffuse", "specular", "c", "c_sd", "normal_sd", "status", "residual_rms")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from impasto.fit.procedure import FitOptions
 from impasto.geometry import Array, Camera, arm_direction, direction_tilts
 from impasto.models import ModelSpec
-from impasto.procedure import FitOptions
 from impasto.store import Maps
 
 NEGLIGIBLE = 0.02

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from impasto import store as stores
 from impasto.geometry import pixel_position_mm
-from impasto.highlights import Array, Highlights, separate
+from impasto.stack.highlights import Array, Highlights, separate
 
 # Pixels looked at, in a lattice on chunks spread over the painting; fewer where lights are many.
 _PIXELS = 8192

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto import store as stores
+from impasto.fit.procedure import FitOptions
 from impasto.geometry import Camera, Lights
 from impasto.models import ModelSpec
-from impasto.procedure import FitOptions
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ import numpy as np
 
 from impasto.arm import PLANE_TOLERANCE_DEG, Arm
 from impasto.errors import Problem
+from impasto.fit.paper.threshold import LEAST_DEG, lights_beyond
+from impasto.fit.procedure import FitOptions
 from impasto.geometry import Camera, Lights
 from impasto.models import ModelSpec
-from impasto.paper.threshold import LEAST_DEG, lights_beyond
-from impasto.procedure import FitOptions
 
 
 def lights_needed(model: ModelSpec) -> int:

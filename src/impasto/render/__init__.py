@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto.animation import Animation
 from impasto.band_writers import BandWriter
 from impasto.colour.displays import Display
 from impasto.colour.rendition import Rendition, Shown
@@ -24,8 +23,9 @@ from impasto.models import parse_model
 from impasto.output import prepare_folder
 from impasto.pixels import read_pixels, render_pixels
 from impasto.progress import progress
-from impasto.render_display import requested_rendition
-from impasto.render_lights import requested_lights
+from impasto.render.animation import Animation
+from impasto.render.display import requested_rendition
+from impasto.render.lights import requested_lights
 from impasto.store import Fit, open_fit, open_stack
 
 _BAND_BYTES = 192e6

@@ -17,9 +17,9 @@ import numpy as np
 from impasto import store as stores
 from impasto.capture import Capture, Photograph, read_capture
 from impasto.errors import CaptureError, Problem, StoreError, raise_problems
-from impasto.light_colour import light_colour
-from impasto.linearise import Linearisation, linearisations
 from impasto.progress import progress
+from impasto.stack.light_colour import light_colour
+from impasto.stack.linearise import Linearisation, linearisations
 
 # Noise in relative radiance where the capture does not state it, by the type of the photographs: an 8-bit
 # encoding rounds to half a per cent of the radiance and to 0.001 near black; see docs/store.md.

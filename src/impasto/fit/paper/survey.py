@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from impasto import store as stores
 from impasto.errors import OptionError, Problem
+from impasto.fit.streaming import read_tiles
 from impasto.progress import progress
-from impasto.streaming import read_tiles
 
 # Enough for a 99th percentile, few enough to cost nothing.
 _GRID_PIXELS = 4096

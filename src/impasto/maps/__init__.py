@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto import map_pictures
 from impasto.band_writers import BandWriter, write_tiff_bands
 from impasto.colour import encode_srgb
+from impasto.maps import pictures
 from impasto.models import parse_model
 from impasto.output import prepare_folder, write_json
 from impasto.progress import progress
@@ -269,14 +269,14 @@ class _MapWriter:
     def _draw(self, low: float, high: float) -> None:
         path, heading = self._path(".png"), self._heading
         if self._name == "normal":
-            map_pictures.draw_normal(path, self._preview, title=heading)
+            pictures.draw_normal(path, self._preview, title=heading)
         elif self._name in _COLOURS and not self._uncertainty:
-            map_pictures.draw_colour(path, self._preview, title=heading, exposure=1 / high)
+            pictures.draw_colour(path, self._preview, title=heading, exposure=1 / high)
         else:
             values = self._preview
             if values.ndim == 3:
                 values = np.sqrt(np.mean(np.square(values), axis=2)) if self._uncertainty else values[..., 0]
-            map_pictures.draw_values(
+            pictures.draw_values(
                 path,
                 np.degrees(values) if self._name == "normal_sd" else values,
                 title=heading,
@@ -307,7 +307,7 @@ class _MapWriter:
             path, codes(), (*self._fit.shape, 1), np.uint8, description=f"{self._title}. {encoding}"
         )
         meaning = {code: text for code, text in STATUS_MEANING.items() if code in counts or code < 6}
-        map_pictures.draw_status(
+        pictures.draw_status(
             self._path(".png"),
             self._preview,
             title=self._heading,

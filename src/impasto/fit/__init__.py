@@ -14,14 +14,14 @@ import numpy as np
 from impasto import store as stores
 from impasto.arm import find_arm
 from impasto.errors import ImpastoError, OptionError, Problem, StoreError, raise_problems
-from impasto.joint import Joint
+from impasto.fit.joint import Joint
+from impasto.fit.paper import Paper
+from impasto.fit.procedure import Findings, FitOptions, Procedure
+from impasto.fit.pyramid import Pyramid
+from impasto.fit.streaming import fit_units
+from impasto.fit.tile import fit_tile
 from impasto.models import ModelSpec, parse_model
-from impasto.paper import Paper
-from impasto.procedure import Findings, FitOptions, Procedure
 from impasto.progress import progress
-from impasto.pyramid import Pyramid
-from impasto.streaming import fit_units
-from impasto.tile import fit_tile
 
 __all__ = ["PROCEDURES", "FitOptions", "FitSummary", "ModelFit", "fit", "fit_tile"]
 

@@ -122,7 +122,7 @@ class SummaryPage:
         str
         """
         body = "\n".join(self._parts)
-        style = files("impasto").joinpath("summary_page.css").read_text(encoding="utf-8")
+        style = files("impasto.demo").joinpath("template.css").read_text(encoding="utf-8")
         return (
             '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
             '<meta http-equiv="Content-Security-Policy" '

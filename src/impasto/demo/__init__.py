@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from impasto.capture.simulate import simulate
-from impasto.demo_page import DemoSummary, write_page
+from impasto.demo.page import DemoSummary, write_page
 from impasto.errors import OutputError, Problem
 from impasto.evaluate import evaluate
 from impasto.evaluate.held_out import spread_lights
@@ -22,7 +22,9 @@ from impasto.maps import maps
 from impasto.render import render
 from impasto.stack import stack
 from impasto.store import open_stack
-from impasto.summaries import evaluate_tables, fit_lines, stack_lines
+from impasto.summaries.evaluate import evaluate_tables
+from impasto.summaries.fit import fit_lines
+from impasto.summaries.stack import stack_lines
 
 MODELS = ("torrance-sparrow", "phong")
 _SIZE = (480, 360)

@@ -1,0 +1,44 @@
+"""The command line: one subcommand per module, listed here in the order of the pipeline."""
+
+from __future__ import annotations
+
+import ctypes
+from contextlib import suppress
+from importlib import import_module
+
+from impasto.cli.app import app
+
+# In the order in which the help lists them.
+COMMANDS = (
+    "simulate",
+    "stack",
+    "fit",
+    "render",
+    "maps",
+    "evaluate",
+    "compare",
+    "gonio",
+    "gloss",
+    "models",
+    "demo",
+)
+
+for _name in COMMANDS:
+    import_module(f"{__name__}.{_name}")
+
+# Parameters of glibc's mallopt.
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
+
+
+def main() -> None:
+    """Run the command line."""
+    _keep_freed_memory()
+    app()
+
+
+def _keep_freed_memory() -> None:
+    """Let large buffers be used again instead of going back to the system, which clears each page anew."""
+    with suppress(OSError, AttributeError):  # where the C library is not glibc
+        library = ctypes.CDLL(None)
+        for parameter in (_TRIM_THRESHOLD, _MMAP_THRESHOLD):
+            library.mallopt(parameter, 1 << 30)

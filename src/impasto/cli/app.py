@@ -1,0 +1,80 @@
+"""The application, and the options that several subcommands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import impasto
+from impasto.errors import OptionError, Problem
+
+app = typer.Typer(
+    name="impasto",
+    help="Measure how a painted surface reflects light, from photographs under a moving light, and show it "
+    "under any light.\n\nPHOTOS is a folder of photographs with their light directions; STORE is the folder "
+    "that holds everything measured from them, by custom named after the painting: painting.zarr.",
+    epilog="Start with: impasto stack photos/ painting.zarr && impasto fit painting.zarr",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Json = Annotated[
+    Path | None, typer.Option("--json", metavar="FILE", help="Write what is printed to FILE, as data.")
+]
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an unexpected error.")]
+Store = Annotated[Path, typer.Argument(metavar="STORE", help="The folder that impasto stack made.")]
+Model = Annotated[str, typer.Option("--model", metavar="NAME", help="Reflectance model; see impasto models.")]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files; made if needed.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what is there.")]
+
+
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"impasto {impasto.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _impasto(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Show the version.", is_eager=True, callback=_tell_version),
+    ] = False,
+) -> None:
+    pass
+
+
+def pixels(texts: list[str] | None) -> list[tuple[int, int]]:
+    """Return the values of --pixel as (column, row)."""
+    return [pair(text, "--pixel", "Write column and row: --pixel 120,80") for text in texts or ()]
+
+
+def pair(text: str, option: str, do: str) -> tuple[int, int]:
+    """Return the two whole numbers that the value of an option holds.
+
+    Parameters
+    ----------
+    text : str
+    option : str
+        As the error names it.
+    do : str
+        What the error says to do.
+
+    Returns
+    -------
+    tuple of int
+
+    Raises
+    ------
+    OptionError
+        If it does not.
+    """
+    try:
+        first, second = (int(part) for part in text.split(","))
+    except ValueError:
+        raise OptionError(Problem(f"{option} {text}", "is not two whole numbers", do)) from None
+    return first, second

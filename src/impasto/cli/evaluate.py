@@ -1,0 +1,44 @@
+"""The subcommand `evaluate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import impasto
+from impasto.cli.app import Debug, Json, Store, app
+from impasto.console import reporting
+from impasto.summaries.evaluate import evaluate_tables
+
+
+@app.command(epilog="Example: impasto evaluate painting.zarr --held-out 5")
+def evaluate(
+    store: Store,
+    held_out: Annotated[
+        int | None,
+        typer.Option("--held-out", metavar="K", help="How many photographs to hold out; 5 by default."),
+    ] = None,
+    held_out_lights: Annotated[
+        Path | None,
+        typer.Option("--held-out-lights", metavar="FILE", help="Names of photographs, or a light file."),
+    ] = None,
+    model: Annotated[
+        list[str] | None,
+        typer.Option("--model", metavar="NAME", help="May be repeated; those in the store by default."),
+    ] = None,
+    json: Json = None,
+    debug: Debug = False,
+) -> None:
+    """Compare renderings with photographs that the fit has not seen."""
+    with reporting("evaluate", json, debug) as report:
+        summary = impasto.evaluate(
+            store, models=model or (), held_out=held_out, held_out_lights=held_out_lights
+        )
+        report.say(f"{len(summary.held_out)} photographs held out, {summary.fitted} fitted")
+        for heading, header, rows in evaluate_tables(summary):
+            report.say()
+            report.say(heading)
+            report.table(header, rows)
+        report.done(summary)

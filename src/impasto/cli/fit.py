@@ -1,0 +1,112 @@
+"""The subcommand `fit`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+import impasto
+from impasto.cli.app import Debug, Json, Overwrite, Store, app
+from impasto.console import reporting
+from impasto.errors import OptionError, Problem
+from impasto.fit import PROCEDURES, FitOptions
+from impasto.summaries.fit import fit_lines
+
+
+@app.command(epilog="Example: impasto fit painting.zarr --model torrance-sparrow --loss cauchy")
+def fit(
+    store: Store,
+    model: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--model", metavar="NAME", help="May be repeated; torrance-sparrow and phong by default."
+        ),
+    ] = None,
+    procedure: Annotated[
+        str | None,
+        typer.Option(
+            "--procedure",
+            metavar="NAME",
+            help=f"{' or '.join(PROCEDURES)}; joint by default, for lights in one plane paper --refined.",
+        ),
+    ] = None,
+    refined: Annotated[
+        bool, typer.Option("--refined", help="The paper's procedure with the calibrated view.")
+    ] = FitOptions.refined,
+    threshold: Annotated[
+        str,
+        typer.Option(
+            "--threshold",
+            metavar="DEG|auto",
+            help="The paper's procedure: how far from its peak a highlight is seen.",
+        ),
+    ] = f"{FitOptions.threshold_deg:g}",
+    highlight: Annotated[
+        str,
+        typer.Option(
+            "--highlight",
+            metavar="WHOSE",
+            help="The paper's procedure: peak that --threshold counts from, pixel or sample.",
+        ),
+    ] = FitOptions.highlight,
+    index: Annotated[
+        float, typer.Option("--index", metavar="N", help="Index of refraction of the surface.")
+    ] = FitOptions.index,
+    fresnel: Annotated[
+        str, typer.Option("--fresnel", metavar="WHICH", help="Angle of incidence: facet or element.")
+    ] = FitOptions.fresnel,
+    loss: Annotated[
+        str, typer.Option("--loss", metavar="KIND", help="linear, or robust: cauchy or huber.")
+    ] = FitOptions.loss,
+    loss_scale: Annotated[
+        float, typer.Option("--loss-scale", metavar="N", help="Where a robust loss sets in, in sigmas.")
+    ] = FitOptions.loss_scale,
+    shadow_level: Annotated[
+        float | None,
+        typer.Option("--shadow-level", metavar="Y", help="Leave out samples darker than this radiance."),
+    ] = FitOptions.shadow_level,
+    exclude: Annotated[
+        list[str] | None,
+        typer.Option("--exclude", metavar="NAME", help="Photograph to leave out; may be repeated."),
+    ] = None,
+    overwrite: Overwrite = False,
+    json: Json = None,
+    debug: Debug = False,
+) -> None:
+    """Fit reflectance models to every pixel of a stack."""
+    with reporting("fit", json, debug) as report:
+        options = FitOptions(
+            index=index,
+            fresnel=fresnel,
+            loss=loss,
+            loss_scale=loss_scale,
+            shadow_level=shadow_level,
+            exclude=tuple(exclude or ()),
+            refined=refined,
+            threshold_deg=_threshold(threshold),
+            highlight=highlight,
+        )
+        more: dict[str, Any] = {"models": tuple(model)} if model else {}
+        summary = impasto.fit(
+            store,
+            procedure=procedure,
+            options=options,
+            overwrite=overwrite,
+            say=lambda note: report.say(f"note: {note}"),
+            **more,
+        )
+        report.say_all(fit_lines(summary))
+        report.say(f"next: impasto maps {store} --model {summary.models[0].model} --out maps/")
+        report.done(summary)
+
+
+def _threshold(text: str) -> float | None:
+    if text == "auto":
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        raise OptionError(
+            Problem(f"--threshold {text}", "is neither a number of degrees nor auto", "Try 35, or auto")
+        ) from None

@@ -1,0 +1,1 @@
+"""What each stage says when it is done, in words: one module per stage."""
