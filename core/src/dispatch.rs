@@ -59,7 +59,8 @@ static AVAILABLE: LazyLock<Vec<Isa>> = LazyLock::new(|| {
     };
     #[cfg(not(target_arch = "x86_64"))]
     let (fused, wide) = (cfg!(target_arch = "aarch64"), false);
-    let found = [(PLAIN, true), (FUSED, fused), (WIDE, wide)];
+    let (plain, wide) = if cfg!(feature = "quick") { (false, false) } else { (true, wide) };
+    let found = [(PLAIN, plain), (FUSED, fused), (WIDE, wide)];
     found.into_iter().filter_map(|(isa, has)| has.then_some(isa)).collect()
 });
 
@@ -81,7 +82,7 @@ pub fn instruction_name(isa: Isa) -> &'static str {
 macro_rules! with_instructions {
     ($isa:ident => $expression:expr) => {
         match instructions() {
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", not(feature = "quick")))]
             WIDE => {
                 const $isa: Isa = WIDE;
                 $expression
@@ -90,10 +91,13 @@ macro_rules! with_instructions {
                 const $isa: Isa = FUSED;
                 $expression
             }
+            #[cfg(not(feature = "quick"))]
             _ => {
                 const $isa: Isa = PLAIN;
                 $expression
             }
+            #[cfg(feature = "quick")]
+            _ => panic!("a core built with the feature `quick` needs a processor with AVX2 or Arm's vectors"),
         }
     };
 }
