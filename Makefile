@@ -1,32 +1,39 @@
 # Everything the two commands of the README need is set up here; nothing is expected beyond
-# Python 3.11+ (with venv), a Rust toolchain and make.
+# Python 3.11+ (with venv), a Rust toolchain, Node 20.19+ (with npm) and make.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 CORE   := $(shell find core/src -name '*.rs') core/Cargo.toml core/Cargo.lock
+NODE   := viewer/node_modules/.installed
+WEB    := src/impasto/web/.built
+PAGES  := $(wildcard viewer/*.*) $(shell find viewer/src viewer/public -type f 2>/dev/null)
 
-.PHONY: demo test test-rust test-python check bench lock clean
+.PHONY: demo test test-rust test-viewer test-python check bench lock clean browser
 
-demo: $(VENV)/.built
+demo: $(VENV)/.built $(WEB)
 	$(BIN)/impasto demo
 
-test: test-rust check test-python
+test: test-rust check test-viewer test-python
 
 test-rust:
 	cargo test --locked --no-default-features --manifest-path core/Cargo.toml
 
-test-python: $(VENV)/.built
+test-viewer: $(NODE)
+	npm --prefix viewer test
+
+test-python: $(VENV)/.built $(WEB) browser
 	$(BIN)/pytest
 
-check: $(VENV)/.built
+check: $(VENV)/.built $(NODE)
 	cargo fmt --check --manifest-path core/Cargo.toml
 	cargo clippy --locked --all-targets --manifest-path core/Cargo.toml -- -D warnings
 	$(BIN)/ruff check src tests benchmarks
 	$(BIN)/ruff format --check src tests benchmarks
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	npm --prefix viewer run check
 
-bench: $(VENV)/.built
+bench: $(VENV)/.built $(WEB) browser
 	$(BIN)/python -m benchmarks
 
 # The environment: locked packages first, then the Rust core and the package itself, editable.
@@ -39,11 +46,27 @@ $(VENV)/.built: $(VENV)/.installed pyproject.toml $(CORE)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	touch $@
 
+# The pages, which the package carries in src/impasto/web.
+$(NODE): viewer/package.json viewer/package-lock.json viewer/.npmrc
+	npm --prefix viewer ci
+	touch $@
+
+$(WEB): $(NODE) $(PAGES)
+	npm --prefix viewer run build
+	touch $@
+
+# The tests of the pages run in Debian's browser.
+browser:
+	@command -v chromium >/dev/null || { \
+	  apt=$$(command -v apt-get) && [ "$$(id -u)" = 0 ] || apt="sudo $$apt"; \
+	  $$apt update --quiet && $$apt install --yes --quiet --no-install-recommends chromium; }
+
 # Lock files hold versions and hashes, never download addresses. Needs uv.
 lock:
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header \
 	  --group dev pyproject.toml --output-file requirements/dev.txt
 	cargo generate-lockfile --manifest-path core/Cargo.toml
+	npm --prefix viewer install --package-lock-only
 
 clean:
-	rm -rf $(VENV) core/target demo
+	rm -rf $(VENV) core/target demo viewer/node_modules src/impasto/web

@@ -1,8 +1,17 @@
 """Fixtures that every test may use."""
 
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+# SwiftShader draws WebGL without a graphics card, the same on every machine.
+_CHROMIUM_FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
 
 @pytest.fixture(scope="session")
@@ -33,3 +42,26 @@ def painting(capture: Path) -> Path:
     impasto.stack(capture, store)
     impasto.fit(store)
     return store
+
+
+@pytest.fixture(scope="session")
+def web() -> Path:
+    """Return the folder of the built pages, or skip."""
+    folder = Path(__file__).resolve().parents[1] / "src" / "impasto" / "web"
+    if not (folder / "index.html").is_file():
+        pytest.skip("the pages are not built: make src/impasto/web/.built")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def browser() -> "Iterator[Browser]":
+    """Return a browser that draws WebGL2 in software, or skip; make contexts and pages of it as needed."""
+    executable = shutil.which("chromium")
+    if executable is None:
+        pytest.skip("chromium is not installed: make browser")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=executable, args=_CHROMIUM_FLAGS)
+        yield chromium
+        chromium.close()
