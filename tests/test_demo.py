@@ -6,8 +6,8 @@ from html.parser import HTMLParser
 import pytest
 
 import impasto
-from impasto.demo.template import Picture, SummaryPage
 from impasto.errors import OutputError
+from impasto.page import Page, Picture
 
 
 @pytest.fixture(scope="module")
@@ -71,10 +71,12 @@ def test_a_demo_replaces_a_demo_and_nothing_else(made, tmp_path):
 
 
 def test_words_on_a_page_are_words():
-    page = SummaryPage("a < b", "& so on")
-    page.table(("<i>",), [("x & y",)])
-    page.pictures([Picture(b"png", '"quoted" <b>')])
+    page = Page("a < b", "& so on", contents=True)
+    section = page.section("1 < 2")
+    section.table(("<i>",), [("x & y",)], caption="<u>")
+    section.pictures([Picture(b"png", '"quoted" <b>')])
     html = page.html()
     assert "<i>" not in html
     assert "<b>" not in html
+    assert "<u>" not in html
     assert "x &amp; y" in html

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from impasto.colour import encode_srgb, quantise
 from impasto.console import versions
-from impasto.demo.template import Picture, SummaryPage
 from impasto.evaluate import EvaluateSummary
 from impasto.fit import FitSummary
 from impasto.maps import MapsSummary
+from impasto.page import Page, Picture
 from impasto.render import RenderSummary
 from impasto.stack import StackSummary
 from impasto.store import open_fit, open_stack
@@ -81,7 +81,7 @@ def write_page(summary: DemoSummary, truth: Path) -> None:
         If the page cannot be written.
     """
     stacked, evaluated = summary.stacked, summary.evaluated
-    page = SummaryPage(
+    page = Page(
         "A painting under any light",
         f"{stacked.photographs} simulated photographs of {stacked.width} x {stacked.height} pixels, "
         f"measured by two reflectance models, and rendered under {len(evaluated.held_out)} lights that the "
@@ -93,31 +93,31 @@ def write_page(summary: DemoSummary, truth: Path) -> None:
     if sweep.animation:
         caption = "Rendered from the fit under a light that moves along the arm, from -66° to 66°"
         shown.append(Picture(sweep.animation.read_bytes(), caption, "image/webp"))
-    page.pictures(shown, wide=True)
+    page.section("The painting").pictures(shown, wide=True)
 
-    page.heading("Lights that the fit has not seen")
-    page.text(
+    part = page.section("Lights that the fit has not seen")
+    part.text(
         "These photographs were kept out of the fit, and rendered from it. All pictures are brightened "
         f"{summary.exposure:g} times, so that a white surface facing the light is white."
     )
     for pictures in _held_out_pictures(summary):
-        page.pictures(pictures)
-    page.table(*_errors(evaluated), caption="Photographs kept out of the fit", total=True)
-    page.text(
+        part.pictures(pictures)
+    part.table(*_errors(evaluated), caption="Photographs kept out of the fit", total=True)
+    part.text(
         "PSNR and SSIM compare the pictures in sRGB, as photographed and not brightened. RMS / mean compares "
         "relative radiance over all samples that are not clipped."
     )
 
-    page.heading("What was measured")
+    part = page.section("What was measured")
     chosen = summary.mapped[0]
-    page.text(f"Maps of the {_title(chosen.model)} model, with their uncertainty.")
+    part.text(f"Maps of the {_title(chosen.model)} model, with their uncertainty.")
     previews = {entry.name: entry.preview for entry in chosen.maps}
-    page.pictures(
+    part.pictures(
         [Picture(previews[name].read_bytes(), _caption(name)) for name in _SHOWN_MAPS if name in previews],
         wide=True,
     )
     statuses = dict.fromkeys(status for model in summary.fitted.models for status in model.pixels)
-    page.table(
+    part.table(
         ("model", *statuses, "pixels per second"),
         [
             (
@@ -130,21 +130,21 @@ def write_page(summary: DemoSummary, truth: Path) -> None:
         caption="How the fit of each pixel ended",
     )
 
-    page.heading("How far from the truth")
-    page.text(
+    part = page.section("How far from the truth")
+    part.text(
         "The painting is simulated, so its true normals and highlights are known. The photographs have "
         "noise, cast shadows and clipping, but their highlights follow one of the two models fitted here. "
         "Real paint does not, and errors on real photographs are larger."
     )
-    page.table(
+    part.table(
         ("model", "normal, median", "normal, 95th percentile", "c / true c, median"),
         list(_truth_rows(summary, truth)),
         caption="Angle between fitted and true normal; fitted over true width of the highlight",
     )
 
-    page.notes("Assumed or left out", [*stacked.notes, *summary.fitted.notes])
-    page.heading("The same by hand")
-    page.commands(
+    part.notes("Assumed or left out", [*stacked.notes, *summary.fitted.notes])
+    part = page.section("The same by hand")
+    part.commands(
         (
             "impasto simulate photos/ --dome",
             "impasto stack photos/ painting.zarr",
@@ -154,13 +154,13 @@ def write_page(summary: DemoSummary, truth: Path) -> None:
             "impasto maps painting.zarr --model torrance-sparrow --out maps/",
         )
     )
-    page.heading("How it was made")
-    page.table(
+    part = page.section("How it was made")
+    part.table(
         ("step", "time"),
         [(name, seconds(duration)) for name, duration in summary.steps.items()],
         caption=f"On {os.cpu_count()} processor cores, {platform.machine()}",
     )
-    page.text(versions())
+    part.text(versions())
     page.write(summary.page)
 
 
