@@ -6,10 +6,9 @@ store as an xarray DataTree.
 
 from __future__ import annotations
 
-import sys
-from importlib import import_module
-from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from impasto.lazy import make_lazy
 
 if TYPE_CHECKING:
     from impasto import models
@@ -70,26 +69,4 @@ _HOME = {
 }
 
 
-class _Package(ModuleType):
-    """The package, in which a stage's name always means the function and never its module."""
-
-    def __getattr__(self, name: str) -> Any:
-        if name == "__version__":
-            from importlib.metadata import version
-
-            return version(__name__)
-        if name not in _HOME:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        home = import_module(f"{__name__}.{_HOME[name]}")
-        value = home if name == "models" else getattr(home, name)
-        setattr(self, name, value)
-        return value
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        # Python makes a module that it has imported an attribute of the package.
-        if isinstance(value, ModuleType) and name in _HOME and name != "models":
-            value = getattr(value, name)
-        super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
+make_lazy(__name__, _HOME)

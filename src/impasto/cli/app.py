@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 import impasto
 from impasto.errors import OptionError, Problem
 
+
+class _InOrder(TyperGroup):
+    """Lists commands and groups of commands in the order of the pipeline."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        from impasto.cli import COMMANDS
+
+        return sorted(self.commands, key=COMMANDS.index)
+
+
+_CONTEXT = {"help_option_names": ["-h", "--help"]}
+
 app = typer.Typer(
     name="impasto",
+    cls=_InOrder,
     help="Measure how a painted surface reflects light, from photographs under a moving light, and show it "
     "under any light.\n\nPHOTOS is a folder of photographs with their light directions; STORE is the folder "
     "that holds everything measured from them, by custom named after the painting: painting.zarr.",
@@ -19,8 +33,23 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings=_CONTEXT,
 )
+
+
+def group(name: str, help: str) -> typer.Typer:
+    """Return a new group of subcommands, such as `impasto calibrate`, to which they are added.
+
+    Parameters
+    ----------
+    name : str
+    help : str
+        What the group is for.
+    """
+    commands = typer.Typer(no_args_is_help=True, rich_markup_mode=None, context_settings=_CONTEXT)
+    app.add_typer(commands, name=name, help=help)
+    return commands
+
 
 Json = Annotated[
     Path | None, typer.Option("--json", metavar="FILE", help="Write what is printed to FILE, as data.")
