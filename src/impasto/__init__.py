@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from impasto.fit.procedure import FitOptions
     from impasto.geometry import Camera, Lights
     from impasto.maps import maps
+    from impasto.psychophysics import experiment
     from impasto.render import render
     from impasto.stack import stack
     from impasto.store import open
@@ -37,6 +38,7 @@ __all__ = [
     "compare",
     "demo",
     "evaluate",
+    "experiment",
     "fit",
     "gloss",
     "gonio",
@@ -57,6 +59,7 @@ _HOME = {
     "compare": "evaluate.compare",
     "demo": "demo",
     "evaluate": "evaluate",
+    "experiment": "psychophysics.experiment",
     "fit": "fit",
     "gloss": "evaluate.gloss",
     "gonio": "evaluate.gonio",
