@@ -58,6 +58,14 @@ Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an u
 Store = Annotated[Path, typer.Argument(metavar="STORE", help="The folder that impasto stack made.")]
 Model = Annotated[str, typer.Option("--model", metavar="NAME", help="Reflectance model; see impasto models.")]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files; made if needed.")]
+Regions = Annotated[
+    Path | None,
+    typer.Option("--regions", metavar="FILE", help="Picture with a colour per region, black outside."),
+]
+Clusters = Annotated[
+    int | None,
+    typer.Option("--clusters", metavar="K", help="Find K regions of like paint instead of drawn ones."),
+]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what is there.")]
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 import impasto
-from impasto.cli.app import Debug, Json, Store, app
+from impasto.cli.app import Clusters, Debug, Json, Regions, Store, app
 from impasto.console import reporting
 from impasto.summaries.compare import compare_lines, compare_tables
 
@@ -20,10 +20,8 @@ def compare(
         list[str] | None,
         typer.Option("--model", metavar="NAME", help="May be repeated; those in the store by default."),
     ] = None,
-    regions: Annotated[
-        Path | None,
-        typer.Option("--regions", metavar="FILE", help="Picture with a colour per region, black outside."),
-    ] = None,
+    regions: Regions = None,
+    clusters: Clusters = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for a map of the models chosen.")
     ] = None,
@@ -32,7 +30,7 @@ def compare(
 ) -> None:
     """Compare the fitted models: As/Ad, errors at highlights and elsewhere, and the choice per pixel."""
     with reporting("compare", json, debug) as report:
-        summary = impasto.compare(store, models=model or (), regions=regions, out=out)
+        summary = impasto.compare(store, models=model or (), regions=regions, clusters=clusters, out=out)
         for heading, header, rows in compare_tables(summary):
             report.say(heading)
             report.table(header, rows)

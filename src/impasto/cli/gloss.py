@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 import impasto
-from impasto.cli.app import Debug, Json, Model, Store, app, pixels
+from impasto.cli.app import Clusters, Debug, Json, Model, Regions, Store, app, pixels
 from impasto.console import reporting
 from impasto.summaries.gloss import gloss_lines, gloss_table
 
@@ -17,10 +17,8 @@ from impasto.summaries.gloss import gloss_lines, gloss_table
 def gloss(
     store: Store,
     model: Model,
-    regions: Annotated[
-        Path | None,
-        typer.Option("--regions", metavar="FILE", help="Picture with a colour per region, black outside."),
-    ] = None,
+    regions: Regions = None,
+    clusters: Clusters = None,
     pixel: Annotated[
         list[str] | None,
         typer.Option("--pixel", metavar="COLUMN,ROW", help="A single pixel; may be repeated."),
@@ -33,7 +31,9 @@ def gloss(
 ) -> None:
     """Predict what a glossmeter would read at 20, 60 and 85°."""
     with reporting("gloss", json, debug) as report:
-        summary = impasto.gloss(store, model=model, regions=regions, pixels=pixels(pixel), out=out)
+        summary = impasto.gloss(
+            store, model=model, regions=regions, clusters=clusters, pixels=pixels(pixel), out=out
+        )
         report.table(*gloss_table(summary))
         report.say_all(gloss_lines(summary))
         report.done(summary)

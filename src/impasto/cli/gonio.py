@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 import impasto
-from impasto.cli.app import Debug, Json, Out, Store, app, pixels
+from impasto.cli.app import Clusters, Debug, Json, Out, Regions, Store, app, pixels
 from impasto.console import reporting
 from impasto.summaries.gonio import gonio_lines, gonio_table
 
@@ -25,16 +24,16 @@ def gonio(
         list[str] | None,
         typer.Option("--pixel", metavar="COLUMN,ROW", help="A single pixel; may be repeated."),
     ] = None,
-    regions: Annotated[
-        Path | None,
-        typer.Option("--regions", metavar="FILE", help="Picture with a colour per region, black outside."),
-    ] = None,
+    regions: Regions = None,
+    clusters: Clusters = None,
     json: Json = None,
     debug: Debug = False,
 ) -> None:
     """Plot measured and modelled radiance against the angle of the light."""
     with reporting("gonio", json, debug) as report:
-        summary = impasto.gonio(store, out=out, models=model or (), pixels=pixels(pixel), regions=regions)
+        summary = impasto.gonio(
+            store, out=out, models=model or (), pixels=pixels(pixel), regions=regions, clusters=clusters
+        )
         report.table(*gonio_table(summary))
         report.say_all(gonio_lines(summary))
         report.done(summary)

@@ -44,7 +44,7 @@ def draw_curve(path: Path, curve: Curve, fits: Mapping[str, Fit]) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9.0, 7.0), dpi=110, facecolor="white", layout="constrained")
+    figure = Figure(figsize=(10.4, 6.6), dpi=110, facecolor="white", layout="constrained")
     FigureCanvasAgg(figure)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1.0))
     order = np.argsort(curve.angle_deg, kind="stable")
@@ -80,15 +80,21 @@ def draw_curve(path: Path, curve: Curve, fits: Mapping[str, Fit]) -> None:
     for side, degrees in enumerate(_thresholds(fits, curve) if on_arm else ()):
         label = "threshold of the diffuse lights" if side == 0 else None
         upper.axvline(degrees, color=_INK, linewidth=0.8, linestyle=(0, (4, 3)), label=label)
-    upper.set_ylabel("relative radiance per unit irradiance")
+    upper.set_ylabel("relative radiance per unit of irradiance")
     lower.set_ylabel("model − measured")
     lower.set_xlabel(f"{curve.angle_name}, degrees")
     lower.axhline(0.0, color=_INK, linewidth=0.8)
-    of = f"mean of {curve.pixels:,} pixels" if curve.pixels != 1 else "one pixel"
-    figure.suptitle(f"{curve.name} · luminance, {of}", x=0.02, ha="left", color=_INK)
-    upper.legend(facecolor="white", framealpha=0.92, edgecolor="none", fontsize=9, loc="upper right")
+    figure.suptitle(f"{curve.name} · luminance, {_of(curve)}", x=0.02, ha="left", color=_INK)
+    # Beside the curves, where it hides none of them.
+    figure.legend(*upper.get_legend_handles_labels(), edgecolor="none", fontsize=9, loc="outside right upper")
     with written_whole(path) as temporary:
         figure.savefig(temporary, format="png")
+
+
+def _of(curve: Curve) -> str:
+    if curve.pixels != 1:
+        return f"mean of {curve.pixels:,} pixels"
+    return "column {}, row {}".format(*curve.pixel) if curve.pixel else "one pixel"
 
 
 def _shade(axes: Axes, curve: Curve, order: np.ndarray, on_arm: bool) -> None:

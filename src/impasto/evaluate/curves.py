@@ -48,6 +48,8 @@ class Curve:
     name : str
     pixels : int
         How many pixels the curve is the mean of.
+    pixel : (int, int) or None
+        Column and row, where it is the curve of one.
     lights : tuple of str
     angle_deg : ndarray of shape (L,)
         The lights' angle on the arm, or, for lights that do not lie in a plane, from the mirror direction.
@@ -67,6 +69,7 @@ class Curve:
 
     name: str
     pixels: int
+    pixel: tuple[int, int] | None
     lights: tuple[str, ...]
     angle_deg: Array
     angle_name: str
@@ -143,6 +146,7 @@ class CurveSums:
     def curve(self) -> Curve:
         """Return the means; at least one pixel must have been added."""
         assert self._first is not None
+        first = self._first
         lights, camera = self._stack.lights, self._stack.camera
         with np.errstate(invalid="ignore"):
             measured = self._measured / self._weight
@@ -157,11 +161,12 @@ class CurveSums:
         angle = np.degrees(np.arctan2(in_arm[:, 0], in_arm[:, 2])) if arm.planar else off_mirror
         shapes = np.concatenate(self._shape)
         half_width = (
-            half_width_deg(self._first, np.median(shapes, axis=0), normal, camera) if len(shapes) else np.nan
+            half_width_deg(first, np.median(shapes, axis=0), normal, camera) if len(shapes) else np.nan
         )
         curve = Curve(
             name=self._name,
             pixels=self._pixels,
+            pixel=(int(first.column[0]), int(first.row[0])) if len(first) == self._pixels == 1 else None,
             lights=lights.names,
             angle_deg=angle,
             angle_name="angle of the light on the arm" if arm.planar else "angle from the mirror direction",

@@ -16,8 +16,9 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
 from impasto.band_writers import BandWriter
+from impasto.evaluate.clusters import choose_regions
 from impasto.evaluate.glossmeter import GLOSSMETERS, Glossmeter, quadrature
-from impasto.evaluate.regions import Sample, check_inside, read_regions, sample_regions
+from impasto.evaluate.regions import Sample, check_inside, sample_regions
 from impasto.geometry import Array, Camera, Lights
 from impasto.maps.pictures import draw_values
 from impasto.models import ModelSpec, basis, parse_model
@@ -111,6 +112,7 @@ def gloss(
     *,
     model: str,
     regions: str | PathLike[str] | None = None,
+    clusters: int | None = None,
     pixels: Sequence[tuple[int, int]] = (),
     out: str | PathLike[str] | None = None,
     show_progress: bool | None = None,
@@ -128,6 +130,8 @@ def gloss(
     model : str
     regions : path, optional
         Image of the painting's size with a colour per region; see `read_regions`.
+    clusters : int, optional
+        Have this many regions found instead, from the maps; see `cluster_regions`.
     pixels : sequence of (int, int), optional
         Single pixels, column and row.
     out : path, optional
@@ -158,10 +162,10 @@ def gloss(
     stack = open_stack(Path(store))
     height, width = fit.shape
     check_inside(pixels, height, width)
-    drawn = read_regions(Path(regions), height, width) if regions else None
+    divided = choose_regions(fit, regions, clusters, show=show_progress)
     folder = prepare_folder(out) if out else None
     tables = [PixelGloss(spec, fit.attributes, meter) for meter in GLOSSMETERS]
-    samples = sample_regions(fit, drawn, _SAMPLED, show=show_progress)
+    samples = sample_regions(fit, divided, _SAMPLED, show=show_progress)
     found = [_region(name, sample, tables) for name, sample in samples.items()]
     found += [_pixel(fit, column, row, tables) for column, row in pixels]
     files = _write_maps(folder, fit, tables, stack.absolute, show_progress) if folder else ()

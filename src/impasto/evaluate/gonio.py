@@ -13,21 +13,19 @@ from pathlib import Path
 
 import numpy as np
 
-from impasto.errors import OptionError, Problem
+from impasto.evaluate.clusters import choose_regions, write_regions
 from impasto.evaluate.compare import ordered_fits
 from impasto.evaluate.curve_plot import draw_curve
 from impasto.evaluate.curves import Curve, CurveSums, columns
-from impasto.evaluate.regions import Regions, check_inside, read_regions, sample_regions
-from impasto.models import basis, parse_model
+from impasto.evaluate.regions import Regions, check_inside
+from impasto.evaluate.telling import telling_pixels
+from impasto.models import parse_model
 from impasto.output import prepare_folder, write_text
-from impasto.pixels import Pixels, read_pixels
+from impasto.pixels import read_pixels
 from impasto.progress import progress
 from impasto.store import Fit, Stack, open_fit, open_stack
 
 _TILE_ROWS, _TILE_COLUMNS = 256, 512
-_SAMPLED = 20_000
-# Which pixels are shown unasked, by the rank of the height of their highlight.
-_TELLING = {"high highlight": 0.99, "typical highlight": 0.5, "low highlight": 0.01}
 
 
 @dataclass(frozen=True)
@@ -57,6 +55,7 @@ def gonio(
     models: Sequence[str] = (),
     pixels: Sequence[tuple[int, int]] = (),
     regions: str | PathLike[str] | None = None,
+    clusters: int | None = None,
     show_progress: bool | None = None,
 ) -> GonioSummary:
     """Plot measured and modelled radiance against the angle of the light [Chen2007]_, Figs. 4 and 6 to 8.
@@ -70,9 +69,12 @@ def gonio(
     models : sequence of str, optional
         Models to show, by default all that are fitted. The first tells how wide the highlight is.
     pixels : sequence of (int, int), optional
-        Single pixels, column and row. Without pixels and regions, three that tell the range of highlights.
+        Single pixels, column and row. Without pixels and regions, four that tell the range: see
+        `telling_pixels`.
     regions : path, optional
         Image of the painting's size with a colour per region; a region's curve is the mean of its pixels.
+    clusters : int, optional
+        Have this many regions found instead, from the first model's maps; see `cluster_regions`.
     show_progress : bool, optional
         Whether to show a progress bar; by default, if standard error is a terminal.
 
@@ -96,15 +98,16 @@ def gonio(
     fits = {name: open_fit(path, name) for name in names}
     height, width = stack.shape[1:3]
     check_inside(pixels, height, width)
-    drawn = read_regions(Path(regions), height, width) if regions else None
+    divided = choose_regions(fits[names[0]], regions, clusters, show=show_progress)
     folder = prepare_folder(out)
     places = {f"pixel {column},{row}": (column, row) for column, row in pixels}
-    if not places and drawn is None:
-        places = _telling_pixels(fits[names[0]], stack, show_progress)
-    curves = [_pixel_curve(name, *place, stack, fits) for name, place in places.items()]
-    if drawn is not None:
-        curves += _region_curves(drawn, stack, fits, show_progress)
+    if not places and divided is None:
+        places = telling_pixels(fits[names[0]], stack, show=show_progress)
+    curves = [pixel_curve(name, *place, stack, fits) for name, place in places.items()]
     files: list[Path] = []
+    if divided is not None:
+        curves += _region_curves(divided, stack, fits, show_progress)
+        files += write_regions(folder, divided) if clusters else []
     for curve in curves:
         stem = folder / re.sub(r"[^0-9A-Za-z]+", "-", curve.name).strip("-")
         write_text(stem.with_suffix(".csv"), _csv(curve))
@@ -113,7 +116,8 @@ def gonio(
     return GonioSummary(path, folder, tuple(curves), tuple(files), time.perf_counter() - started)
 
 
-def _pixel_curve(name: str, column: int, row: int, stack: Stack, fits: Mapping[str, Fit]) -> Curve:
+def pixel_curve(name: str, column: int, row: int, stack: Stack, fits: Mapping[str, Fit]) -> Curve:
+    """Return the curve of one pixel, which gets the name `name`."""
     sums = CurveSums(name, stack, tuple(fits))
     _add(sums, stack, fits, slice(row, row + 1), slice(column, column + 1))
     return sums.curve()
@@ -121,7 +125,10 @@ def _pixel_curve(name: str, column: int, row: int, stack: Stack, fits: Mapping[s
 
 def _region_curves(drawn: Regions, stack: Stack, fits: Mapping[str, Fit], show: bool | None) -> list[Curve]:
     _, height, width, _ = stack.shape
-    sums = [CurveSums(f"region {name}", stack, tuple(fits)) for name in drawn.names]
+    sums = [
+        CurveSums(name if name.startswith("cluster") else f"region {name}", stack, tuple(fits))
+        for name in drawn.names
+    ]
     with progress("gonio", height * width, show=show) as advance:
         for top in range(0, height, _TILE_ROWS):
             for left in range(0, width, _TILE_COLUMNS):
@@ -149,38 +156,6 @@ def _add(
         radiance = radiance[:, chosen]
         fitted = {name: pixels.select(chosen) for name, pixels in fitted.items()}
     sums.add(radiance, fitted)
-
-
-def _telling_pixels(fit: Fit, stack: Stack, show: bool | None) -> dict[str, tuple[int, int]]:
-    """Return a pixel with a high, a typical and a low highlight."""
-    sample = next(iter(sample_regions(fit, None, _SAMPLED, show=show).values())).pixels
-    if not len(sample):
-        raise OptionError(
-            Problem(
-                where=f"{stack.store}: {fit.group}",
-                what="no pixel has a highlight that is known",
-                do="Name pixels with --pixel, or fit lambert and look at its maps",
-            )
-        )
-    order = np.argsort(_highlight(sample, stack.camera.view_direction), kind="stable")
-    chosen = {name: order[round(rank * (len(order) - 1))] for name, rank in _TELLING.items()}
-    return {name: (int(sample.column[number]), int(sample.row[number])) for name, number in chosen.items()}
-
-
-def _highlight(pixels: Pixels, view: np.ndarray) -> np.ndarray:
-    """Return the height of the highlights, lit from their mirror direction, shape (P,)."""
-    normal = pixels.normal.astype(np.float64)
-    mirror = 2 * (normal @ view)[:, None] * normal - view
-    _, lobes = basis(
-        pixels.model,
-        normal,
-        mirror,
-        np.tile(view, (len(pixels), 1)),
-        pixels.shape,
-        index=pixels.attributes["index_of_refraction"],
-        fresnel=pixels.attributes["fresnel"],
-    )
-    return np.asarray(np.sum(pixels.specular * lobes, axis=1))
 
 
 def _csv(curve: Curve) -> str:

@@ -26,8 +26,11 @@ _INK = "#22201c"
 _TEXT_PT = 13
 
 # Okabe and Ito's palette, which stays distinct for the common colour deficiencies [OkabeIto2008]_; the usual
-# outcome is the quiet one.
-_STATUS_COLOURS = ("#e8e4da", "#56b4e9", "#e69f00", "#cc79a7", "#000000", "#009e73", "#d55e00", "#0072b2")
+# outcome is the quiet one. Where more are needed, Tol's muted ones follow [Tol2021]_.
+_STATUS_COLOURS = (
+    *("#e8e4da", "#56b4e9", "#e69f00", "#cc79a7", "#000000", "#009e73", "#d55e00", "#0072b2"),
+    *("#882255", "#ddcc77", "#332288", "#44aa99", "#999933"),
+)
 
 
 def draw_values(

@@ -43,5 +43,10 @@ def compare_lines(summary: CompareSummary) -> Iterator[str]:
     yield "chosen: share of the pixels whose Bayesian information criterion is least with the model"
     if first.unknown_pixels:
         yield f"{count(first.unknown_pixels, 'pixel')} left out: some model has no full fit there"
+    for spread in summary.spread:
+        yield (
+            f"As/Ad of {spread.model} over {spread.regions} regions: {spread.mean:.4g} ± {spread.sd:.2g}, "
+            f"{spread.low:.3g} to {spread.high:.3g}"
+        )
     if summary.files:
-        yield f"map of the choice in {summary.files[0].parent}"
+        yield f"maps in {summary.files[0].parent}"
