@@ -10,6 +10,7 @@ import tifffile
 import impasto
 from impasto.errors import OptionError
 from impasto.fit import FitOptions
+from impasto.store import open_stack, read_evaluation
 from impasto.store.borrow import borrowed_stack
 
 MODEL = "torrance-sparrow"
@@ -22,10 +23,30 @@ def listing(folder):
     return sorted((path, path.stat().st_mtime_ns) for path in folder.rglob("*") if path.is_file())
 
 
-def test_the_store_and_its_neighbourhood_stay_as_they_are(painting):
-    before = listing(painting.parent)
-    impasto.evaluate(painting, models=["phong"], held_out=1)
-    assert listing(painting.parent) == before
+def test_nothing_but_the_result_is_added_to_the_store(painting):
+    def rest():
+        return [entry for entry in listing(painting.parent) if "evaluations" not in entry[0].parts]
+
+    before = rest()
+    summary = impasto.evaluate(painting, models=["phong"], held_out=1)
+    assert rest() == before
+    kept = read_evaluation(painting, "phong")
+    (entry,) = kept.attributes["lights"]
+    assert entry["errors"]["rms_relative"] == summary.models[0].mean.rms_relative
+    assert kept.attributes["options"]["exclude"] == list(summary.held_out)
+    assert kept.attributes["stack_sha256"] == open_stack(painting).sha256
+
+
+def test_the_renderings_that_are_kept_are_those_that_were_compared(painting):
+    summary = impasto.evaluate(painting, models=["phong"], held_out=1)
+    stack = open_stack(painting)
+    _, height, width, _ = stack.shape
+    light = stack.lights.names.index(summary.held_out[0])
+    photograph = stack.radiance(slice(0, height), slice(0, width), [light])[0]
+    rendering = read_evaluation(painting, "phong").renderings()[0]
+    usable = np.isfinite(rendering) & (photograph < stack.clip_level)
+    rms = np.sqrt(np.mean((rendering - photograph)[usable] ** 2)) / photograph[usable].mean()
+    assert rms == pytest.approx(summary.models[0].mean.rms_relative, rel=1e-4)
 
 
 def test_only_what_no_run_holds_any_more_is_swept(painting, tmp_path):

@@ -58,6 +58,7 @@ def test_telling_pixels_differ_in_their_highlights(painting, tmp_path):
         "high highlight",
         "typical highlight",
         "low highlight",
+        "poorly described",
     ]
     assert all(file.is_file() for file in summary.files)
 

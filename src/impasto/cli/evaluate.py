@@ -41,4 +41,6 @@ def evaluate(
             report.say()
             report.say(heading)
             report.table(header, rows)
+        if summary.not_recorded:
+            report.say(f"not kept for impasto report: {summary.not_recorded}")
         report.done(summary)

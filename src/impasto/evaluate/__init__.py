@@ -5,14 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from impasto.colour import encode_srgb
-from impasto.errors import OptionError, Problem
+from impasto.errors import OptionError, Problem, StoreError
 from impasto.evaluate.errors import ErrorAccumulator, ImageErrors
 from impasto.evaluate.held_out import listed_lights, named_lights, spread_lights
 from impasto.fit import FitOptions, fit
@@ -20,13 +22,23 @@ from impasto.geometry import Lights, zenith_azimuth
 from impasto.models import parse_model
 from impasto.progress import progress
 from impasto.render import render_bands
-from impasto.store import Fit, Stack, fit_attributes, fitted_models, open_fit, open_stack
+from impasto.store import (
+    Fit,
+    Stack,
+    fit_attributes,
+    fitted_models,
+    open_fit,
+    open_stack,
+    write_evaluation,
+)
 from impasto.store.borrow import borrowed_stack
 
 __all__ = ["EvaluateSummary", "ImageErrors", "LightErrors", "ModelErrors", "evaluate"]
 
 _DEFAULT_MODELS = ("torrance-sparrow", "phong")
 _DEFAULT_HELD_OUT = 5
+# The renderings that are kept for a report are thinned out to this many pixels along their longer side.
+_KEPT_PX = 640
 
 
 @dataclass(frozen=True)
@@ -89,6 +101,8 @@ class EvaluateSummary:
         Photographs that the fits have seen.
     models : tuple of ModelErrors
         One entry per model.
+    not_recorded : str
+        Why the store could not keep the result for `report`; empty where it could.
     seconds : float
     """
 
@@ -96,6 +110,7 @@ class EvaluateSummary:
     held_out: tuple[str, ...]
     fitted: int
     models: tuple[ModelErrors, ...]
+    not_recorded: str
     seconds: float
 
 
@@ -111,7 +126,8 @@ def evaluate(
 
     Each model is fitted again without these photographs, with the options of its fit in the store, into a
     temporary store; the fits in the store stay as they are. Where the fit in the store was made without them,
-    it is judged itself.
+    it is judged itself. The errors, and the renderings at a size to look at, are kept in the store, where
+    `report` finds them.
 
     Parameters
     ----------
@@ -144,6 +160,7 @@ def evaluate(
     held = _held_out(stack.lights, held_out, held_out_lights)
     names = tuple(stack.lights.names[index] for index in held)
     results = []
+    not_recorded = ""
     with ExitStack() as keep:
         borrowed: Path | None = None
         for spec in specs:
@@ -162,21 +179,25 @@ def evaluate(
                     show_progress=show_progress,
                 )
             fitted = open_fit(source, spec.name)
-            errors = _compare(fitted, stack, held, show_progress)
-            results.append(
-                ModelErrors(
-                    model=spec.name,
-                    procedure=str(fitted.attributes["procedure"]),
-                    refitted=not unseen,
-                    lights=errors,
-                    mean=_mean([entry.errors for entry in errors]),
-                )
+            errors, kept = _compare(fitted, stack, held, show_progress)
+            result = ModelErrors(
+                model=spec.name,
+                procedure=str(fitted.attributes["procedure"]),
+                refitted=not unseen,
+                lights=errors,
+                mean=_mean([entry.errors for entry in errors]),
             )
+            results.append(result)
+            try:
+                write_evaluation(path, spec.name, _record(result, fitted, stack, kept), kept)
+            except StoreError as error:  # a store that may only be read can be judged all the same
+                not_recorded = str(error)
     return EvaluateSummary(
         store=path,
         held_out=names,
         fitted=len(stack.lights) - len(held),
         models=tuple(results),
+        not_recorded=not_recorded,
         seconds=time.perf_counter() - started,
     )
 
@@ -210,28 +231,51 @@ def _settings(store: Path, model: str) -> tuple[str | None, FitOptions]:
 
 def _compare(
     fitted: Fit, stack: Stack, held: Sequence[int], show_progress: bool | None
-) -> tuple[LightErrors, ...]:
-    """Render the held-out lights and compare them with their photographs, band by band."""
+) -> tuple[tuple[LightErrors, ...], NDArray[np.float32]]:
+    """Compare renderings of the held-out lights with their photographs; return these, thinned out, too."""
     lights = stack.lights.select(np.asarray(held))
     _, height, width, channels = stack.shape
     gathered = [ErrorAccumulator(height, width, channels) for _ in held]
+    step = _step(stack)
+    kept = np.empty((len(held), -(-height // step), -(-width // step), channels), np.float32)
     with progress(f"Comparing {fitted.attributes['model']}", height, show=show_progress) as advance:
         for band in render_bands(fitted, lights, stack.camera):
             photographs = stack.radiance(band.rows, slice(0, width), held)
-            for photograph, rendering, errors in zip(photographs, band.radiance, gathered, strict=True):
-                errors.add(
+            for photograph, rendering, sums in zip(photographs, band.radiance, gathered, strict=True):
+                sums.add(
                     photograph,
                     rendering,
                     encode_srgb(photograph),
                     encode_srgb(rendering),
                     photograph >= stack.clip_level,
                 )
+            first = -(-band.rows.start // step)
+            shown = band.radiance[:, first * step - band.rows.start :: step, ::step]
+            kept[:, first : first + shown.shape[1]] = shown
             advance(band.rows.stop - band.rows.start)
     zenith, azimuth = np.degrees(zenith_azimuth(lights.direction))
-    return tuple(
+    errors = tuple(
         LightErrors(name, float(zenith[index]), float(azimuth[index]), gathered[index].result())
         for index, name in enumerate(lights.names)
     )
+    return errors, kept
+
+
+def _step(stack: Stack) -> int:
+    return -(-max(stack.shape[1:3]) // _KEPT_PX)
+
+
+def _record(result: ModelErrors, fitted: Fit, stack: Stack, kept: NDArray[np.float32]) -> dict[str, Any]:
+    """Return what the store keeps of a result, and which fit of which stack it is about."""
+    return {
+        **asdict(result),
+        **{
+            name: fitted.attributes[name]
+            for name in ("index_of_refraction", "fresnel", "options", "photographs")
+        },
+        "stack_sha256": stack.sha256,
+        "px_per_px": _step(stack),
+    }
 
 
 def _mean(errors: Sequence[ImageErrors]) -> ImageErrors:

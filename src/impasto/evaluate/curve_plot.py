@@ -60,7 +60,12 @@ def draw_curve(path: Path, curve: Curve, fits: Mapping[str, Fit]) -> None:
     if clipped.any():
         shown = np.where(np.isfinite(measured), measured, np.nanmax(measured))
         upper.plot(
-            angle[clipped], shown[clipped], "k^", markerfacecolor="none", markersize=11, label="clipped"
+            angle[clipped],
+            shown[clipped],
+            "k^",
+            markerfacecolor="none",
+            markersize=11,
+            label="clipped: brighter",
         )
     style = "-" if on_arm else "none"
     for index, (name, model) in enumerate(curve.models.items()):
@@ -75,8 +80,10 @@ def draw_curve(path: Path, curve: Curve, fits: Mapping[str, Fit]) -> None:
         lower.plot(angle, diffuse + specular - measured, linestyle=style, **look, **marker)
     middle = float(np.nanmedian(measured)) if np.isfinite(measured).any() else 0.0
     if middle > 0 and np.nanmax(measured) > _HIGH * middle:
-        upper.set_yscale("symlog", linthresh=middle)
-        lower.set_yscale("symlog", linthresh=middle / 10)
+        # Where the linear part ends at a decade, no labels stand within it.
+        decade = 10 ** np.floor(np.log10(middle))
+        upper.set_yscale("symlog", linthresh=decade)
+        lower.set_yscale("symlog", linthresh=decade)
     for side, degrees in enumerate(_thresholds(fits, curve) if on_arm else ()):
         label = "threshold of the diffuse lights" if side == 0 else None
         upper.axvline(degrees, color=_INK, linewidth=0.8, linestyle=(0, (4, 3)), label=label)

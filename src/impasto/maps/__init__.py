@@ -14,45 +14,17 @@ from numpy.typing import NDArray
 
 from impasto.band_writers import BandWriter, write_tiff_bands
 from impasto.colour import encode_srgb
-from impasto.maps import pictures
+from impasto.maps.preview import COLOURS, draw_map, draw_statuses, map_limits, map_title, preview_fit
 from impasto.models import parse_model
 from impasto.output import prepare_folder, write_json
 from impasto.progress import progress
-from impasto.store import STATUS_MEANING, Fit, level_sizes, open_fit
+from impasto.store import STATUS_MEANING, Fit, open_fit
 
 _BAND_ROWS = 256
 _PREVIEW_PX = 1600
 _CODES = 65535
 
 _FILE_NAMES = {"residual_rms": "residual"}
-_TITLES = {
-    "normal": "Normal",
-    "diffuse": "Diffuse magnitude",
-    "specular": "Specular magnitude",
-    "ambient": "Ambient term",
-    "c": "Width of the highlight, c",
-    "m": "Width of the highlight, m",
-    "shininess": "Shininess",
-    "alpha": "Slope of the facets, alpha",
-    "exponent": "Exponent of the facets' distribution",
-    "chi2_reduced": "Reduced chi-square",
-    "residual_rms": "Residual",
-    "view_tilt": "Tilt of the view that suits the highlight",
-    "status": "How the fit of each pixel ended",
-}
-_LABELS = {
-    "specular": "specular magnitude As",
-    "c": "c (small is glossy)",
-    "m": "m (small is glossy)",
-    "shininess": "shininess (large is glossy)",
-    "alpha": "alpha (small is glossy)",
-    "exponent": "exponent (small has long tails)",
-    "chi2_reduced": "reduced chi-square",
-    "residual_rms": "RMS residual, relative radiance",
-    "view_tilt": "θv in the arm's plane, radians",
-}
-_LOGARITHMIC = {"specular", "shininess", "c", "m", "alpha", "exponent", "chi2_reduced", "residual_rms"}
-_COLOURS = {"diffuse", "ambient"}
 
 
 @dataclass(frozen=True)
@@ -151,7 +123,7 @@ def maps(
     fit = open_fit(Path(store), spec.name)
     folder = prepare_folder(out)
     height, width = fit.shape
-    small = _preview_fit(Path(store), spec.name, height, width)
+    small = preview_fit(Path(store), spec.name, (height, width), _PREVIEW_PX)
     counts: dict[int, int] = {}
     written = []
     with progress("maps", len(fit.names), show=show_progress) as advance:
@@ -174,13 +146,6 @@ def maps(
     return summary
 
 
-def _preview_fit(store: Path, model: str, height: int, width: int) -> Fit:
-    """Return the finest level of a fit that is not larger than a preview shall be."""
-    sizes = [(height, width), *level_sizes(height, width)]
-    level = next((number for number, size in enumerate(sizes) if max(size) <= _PREVIEW_PX), len(sizes) - 1)
-    return open_fit(store, model, level)
-
-
 class _MapWriter:
     """Writes the files of one map."""
 
@@ -188,11 +153,7 @@ class _MapWriter:
         self._fit = fit
         self._name = name
         self._preview = preview
-        base = name.removesuffix("_sd")
-        self._uncertainty = base != name
-        title = _TITLES.get(base, base)
-        self._title = f"{title}: standard deviation" if self._uncertainty else title
-        self._heading = f"{self._title} · {fit.attributes['model']}"
+        self._title = map_title(name)
         self._stem = folder / _FILE_NAMES.get(name, name)
 
     def _path(self, ending: str) -> Path:
@@ -213,9 +174,9 @@ class _MapWriter:
         with BandWriter(self._path(".exr"), height, width, letters, self._title) as writer:
             for band in self._bands():
                 writer.write(band)
-        low, high = self._limits()
+        low, high = map_limits(self._name, self._preview)
         encoding = self._write_tiff(low, high, layers)
-        self._draw(low, high)
+        draw_map(self._path(".png"), self._name, self._preview, model=self._fit.attributes["model"])
         finite = self._preview[np.isfinite(self._preview)] if layers == 1 else np.empty(0)
         return MapFiles(
             name=self._name,
@@ -228,21 +189,8 @@ class _MapWriter:
             median=float(np.median(finite)) if finite.size else None,
         )
 
-    def _limits(self) -> tuple[float, float]:
-        """Return the values between which the 16 bits lie."""
-        if self._name == "normal":
-            return -1.0, 1.0
-        if self._name in ("c", "diffuse") and not (self._preview > 1).any():
-            return 0.0, 1.0
-        finite = self._preview[np.isfinite(self._preview)]
-        if self._name == "view_tilt":
-            side = float(np.abs(finite).max()) if finite.size else 1.0
-            return -side, side
-        high = float(np.percentile(finite, 99.9)) if finite.size else 1.0
-        return 0.0, high if high > 0 else 1.0
-
     def _write_tiff(self, low: float, high: float, layers: int) -> str:
-        colours = self._name in _COLOURS and layers in (1, 3)
+        colours = self._name in COLOURS and layers in (1, 3)
         if self._name == "normal":
             encoding = "n = 2 code / 65535 - 1 per axis x, y, z; code (0, 0, 0): no value"
         elif colours:
@@ -266,32 +214,6 @@ class _MapWriter:
         write_tiff_bands(self._path(".tif"), codes(), shape, np.uint16, description=about, srgb=colours)
         return encoding
 
-    def _draw(self, low: float, high: float) -> None:
-        path, heading = self._path(".png"), self._heading
-        if self._name == "normal":
-            pictures.draw_normal(path, self._preview, title=heading)
-        elif self._name in _COLOURS and not self._uncertainty:
-            pictures.draw_colour(path, self._preview, title=heading, exposure=1 / high)
-        else:
-            values = self._preview
-            if values.ndim == 3:
-                values = np.sqrt(np.mean(np.square(values), axis=2)) if self._uncertainty else values[..., 0]
-            pictures.draw_values(
-                path,
-                np.degrees(values) if self._name == "normal_sd" else values,
-                title=heading,
-                label=self._label(),
-                logarithmic=self._name in _LOGARITHMIC or self._uncertainty,
-                uncertainty=self._uncertainty,
-            )
-
-    def _label(self) -> str:
-        if self._name == "normal_sd":
-            return "standard deviation, degrees"
-        if self._uncertainty:
-            return "standard deviation"
-        return _LABELS.get(self._name, self._name)
-
     def write_status(self, counts: dict[int, int]) -> MapFiles:
         """Write the status map, whose codes are kept as they are, and add up `counts`."""
 
@@ -306,14 +228,7 @@ class _MapWriter:
         write_tiff_bands(
             path, codes(), (*self._fit.shape, 1), np.uint8, description=f"{self._title}. {encoding}"
         )
-        meaning = {code: text for code, text in STATUS_MEANING.items() if code in counts or code < 6}
-        pictures.draw_status(
-            self._path(".png"),
-            self._preview,
-            title=self._heading,
-            meaning=meaning,
-            counts=counts,
-        )
+        draw_statuses(self._path(".png"), self._preview, counts, model=self._fit.attributes["model"])
         return MapFiles("status", path, path, self._path(".png"), encoding, 0.0, 255.0, None)
 
 

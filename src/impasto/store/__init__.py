@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from impasto.errors import StoreError
 from impasto.geometry import Camera, Lights
+from impasto.store.evaluations import Evaluation, read_evaluation, write_evaluation
 from impasto.store.files import RunLog, digest, log_path, no_room, run, size_on_disk
 from impasto.store.fits import Fit, Maps, MapsWriter, fit_attributes, fitted_models, open_fit, remove_fit
 from impasto.store.hierarchy import (
@@ -54,6 +55,7 @@ __all__ = [
     "STATUS_MEANING",
     "STATUS_SEVERITY",
     "UNIT",
+    "Evaluation",
     "Fit",
     "Map",
     "Maps",
@@ -78,6 +80,7 @@ __all__ = [
     "open_fit",
     "open_stack",
     "provenance",
+    "read_evaluation",
     "read_fit",
     "read_group",
     "read_stack",
@@ -88,6 +91,7 @@ __all__ = [
     "target_problems",
     "unit_at",
     "units",
+    "write_evaluation",
 ]
 
 
@@ -103,7 +107,8 @@ def open(store: str | Path) -> DataTree:
     -------
     DataTree
         ``stack`` with dimensions (light, y, x, channel) and the lights as coordinates, ``fits/<model>``,
-        ``pyramids/<model>/<level>``. A part whose attribute ``complete`` is false is still being written.
+        ``pyramids/<model>/<level>``, ``evaluations/<model>``. A part whose attribute ``complete``
+        is false is still being written.
 
     Raises
     ------

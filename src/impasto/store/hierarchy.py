@@ -189,6 +189,20 @@ def write_table(
         array[...] = data
 
 
+def create_renderings_array(store: Path, path: str, shape: tuple[int, int, int, int]) -> zarr.Array[Any]:
+    """Create an array of float32 renderings for `shape` (light, y, x, channel), a light per chunk."""
+    return _create(
+        store,
+        path,
+        shape=shape,
+        dtype=np.dtype(np.float32),
+        dimension_names=("light", "y", "x", "channel"),
+        chunks=(1, *shape[1:]),
+        fill_value=float("nan"),
+        attributes={"long_name": "relative radiance as rendered", "units": "1"},
+    )
+
+
 def _create(store: Path, path: str, **arguments: Any) -> zarr.Array[Any]:
     import zarr
     from zarr.codecs import ZstdCodec

@@ -19,6 +19,7 @@ SCHEMA = 1
 STACK = "stack"
 FITS = "fits"
 PYRAMIDS = "pyramids"
+EVALUATIONS = "evaluations"
 
 STACK_CHUNK = 512
 UNIT = 1024

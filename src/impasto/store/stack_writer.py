@@ -25,7 +25,7 @@ from impasto.store.hierarchy import (
     write_group,
     write_table,
 )
-from impasto.store.layout import FITS, PYRAMIDS, SCHEMA, STACK, STACK_CHUNK, stack_fill_value
+from impasto.store.layout import EVALUATIONS, FITS, PYRAMIDS, SCHEMA, STACK, STACK_CHUNK, stack_fill_value
 
 _TABLES: dict[str, tuple[tuple[str, ...], Attributes]] = {
     "light_name": (("light",), {"long_name": "name of the photograph"}),
@@ -153,7 +153,7 @@ class StackWriter:
         found = read_group(store / STACK)
         if found is not None and not fresh and all(found.get(key) == settings[key] for key in settings):
             return found
-        remove(store, FITS, PYRAMIDS, STACK)
+        remove(store, EVALUATIONS, FITS, PYRAMIDS, STACK)
         create_stack_array(
             store,
             self._header.shape,

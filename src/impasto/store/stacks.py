@@ -208,14 +208,16 @@ class Stack:
                 problems.append(Problem(place, f"{entry['name']} is damaged at {where}: {cause}", _AGAIN))
         return problems or [Problem(place, f"cannot be read at {where}: {error}", _AGAIN)]
 
-    def radiance(self, rows: slice, columns: slice, lights: ArrayLike | None = None) -> NDArray[np.float32]:
-        """Return relative radiance of a tile; parameters and errors as for `read`.
+    def radiance(
+        self, rows: slice, columns: slice, lights: ArrayLike | None = None, *, step: int = 1
+    ) -> NDArray[np.float32]:
+        """Return relative radiance of every `step`-th pixel of a tile; else as for `read`.
 
         Returns
         -------
         ndarray of shape (L, rows, columns, C), float32
         """
-        values = self.read(rows, columns, lights).astype(np.float32)
+        values = self.read(rows, columns, lights)[:, ::step, ::step].astype(np.float32)
         if (self.scale, self.offset) != (1.0, 0.0):
             values *= np.float32(self.scale)
             values += np.float32(self.offset)

@@ -1,0 +1,102 @@
+"""What was found when a model was judged by photographs that its fit had not seen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impasto.store.files import reading, writing
+from impasto.store.hierarchy import (
+    Attributes,
+    create_renderings_array,
+    lost_pieces,
+    open_array,
+    provenance,
+    read_group,
+    remove,
+    write_group,
+)
+from impasto.store.layout import EVALUATIONS
+
+_ARRAY = "radiance"
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A recorded evaluation of one model.
+
+    Parameters
+    ----------
+    store : Path
+    attributes : dict
+        The attributes of the group, as docs/store.md lists them.
+    """
+
+    store: Path
+    attributes: Attributes = field(repr=False)
+
+    def renderings(self) -> NDArray[np.float32]:
+        """Return the renderings of the held-out lights, every `px_per_px`-th pixel, shape (L, H, W, C).
+
+        Raises
+        ------
+        StoreError
+            If they are damaged.
+        """
+        path = f"{EVALUATIONS}/{self.attributes['model']}/{_ARRAY}"
+        array = open_array(self.store, path)
+        with reading(self.store, path, "Run impasto evaluate again"):
+            if lost_pieces(self.store, path, array):
+                raise ValueError("a part of the renderings is lost")
+            return np.asarray(array[...])
+
+
+def write_evaluation(
+    store: Path, model: str, attributes: Mapping[str, Any], radiance: NDArray[np.float32]
+) -> None:
+    """Record an evaluation in the place of an earlier one of the model.
+
+    Parameters
+    ----------
+    store : Path
+    model : str
+    attributes : mapping
+        As docs/store.md lists them; numbers that are not finite become null.
+    radiance : ndarray of shape (L, H, W, C)
+        The renderings, thinned out.
+
+    Raises
+    ------
+    StoreError
+        If the disk is full or refuses.
+    """
+    group = f"{EVALUATIONS}/{model}"
+    remove(store, group)
+    if read_group(store / EVALUATIONS) is None:
+        write_group(store, EVALUATIONS, {})
+    shape = (radiance.shape[0], radiance.shape[1], radiance.shape[2], radiance.shape[3])
+    array = create_renderings_array(store, f"{group}/{_ARRAY}", shape)
+    with writing(store, f"{group}/{_ARRAY}"):
+        array[...] = radiance
+    write_group(store, group, {**provenance(), "model": model, **_strict(attributes), "complete": True})
+
+
+def read_evaluation(store: Path, model: str) -> Evaluation | None:
+    """Return the recorded evaluation of a model, or None where there is none."""
+    attributes = read_group(store / EVALUATIONS / model)
+    return Evaluation(store, attributes) if attributes and attributes.get("complete") else None
+
+
+def _strict(value: Any) -> Any:
+    """Return `value` with null for numbers that JSON has no word for."""
+    if isinstance(value, Mapping):
+        return {key: _strict(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_strict(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
