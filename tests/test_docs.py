@@ -49,6 +49,7 @@ def public(kind):
 def test_commands_stand_in_the_order_of_the_pipeline():
     assert PROGRAM.list_commands(None) == [
         "simulate",
+        "calibrate",
         "stack",
         "fit",
         "render",

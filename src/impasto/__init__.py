@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from impasto.lazy import make_lazy
 
 if TYPE_CHECKING:
-    from impasto import models
+    from impasto import calibrate, models
     from impasto.capture.simulate import simulate
     from impasto.demo import demo
     from impasto.errors import ImpastoError
@@ -35,6 +35,7 @@ __all__ = [
     "FitOptions",
     "ImpastoError",
     "Lights",
+    "calibrate",
     "compare",
     "demo",
     "evaluate",
@@ -56,6 +57,7 @@ _HOME = {
     "FitOptions": "fit.procedure",
     "ImpastoError": "errors",
     "Lights": "geometry",
+    "calibrate": "calibrate",
     "compare": "evaluate.compare",
     "demo": "demo",
     "evaluate": "evaluate",

@@ -8,7 +8,8 @@ from impasto.capture.lights import LightFile
 from impasto.capture.lights_csv import read_csv
 from impasto.capture.lights_lp import read_lp
 from impasto.capture.lights_matrix import read_matrix
-from impasto.errors import CaptureError, Problem
+from impasto.errors import CaptureError, Problem, raise_problems
+from impasto.geometry import Camera
 
 _READERS = {".lp": read_lp, ".csv": read_csv, ".tsv": read_csv, ".txt": read_matrix}
 _ENDINGS = ".toml, .lp, .csv"
@@ -74,6 +75,21 @@ def read_light_file(path: Path) -> LightFile:
             )
         )
     return _READERS[suffix](path, _read_text(path))
+
+
+def read_camera(path: Path) -> Camera:
+    """Return where the camera stands, from the table ``[camera]`` of a TOML file.
+
+    Raises
+    ------
+    CaptureError
+        If it cannot be read, or the camera in it cannot be used.
+    """
+    from impasto.capture.lights_toml import toml_camera
+
+    file = toml_camera(path, _read_text(path))
+    raise_problems(CaptureError, file.problems)
+    return file.camera
 
 
 def _read_manifest(path: Path) -> tuple[LightFile, str | None]:

@@ -141,6 +141,21 @@ def read_toml(path: Path, text: str) -> tuple[LightFile, str | None]:
     return file, manifest.lights
 
 
+def toml_camera(path: Path, text: str) -> LightFile:
+    """Read the table ``[camera]`` of a TOML file, whatever else is in it; see `LightFile.problems`."""
+    file = LightFile(path)
+    try:
+        content = tomllib.loads(text)
+        camera = _Manifest.model_validate({"camera": content.get("camera", {})}).camera
+    except tomllib.TOMLDecodeError as error:
+        file.problems.append(Problem(path.name, f"is not valid TOML: {error}", "Correct the syntax there"))
+    except ValidationError as error:
+        file.problems += [_problem(path, content, dict(detail)) for detail in error.errors()]
+    else:
+        _take_camera(file, camera)
+    return file
+
+
 def _take_camera(file: LightFile, camera: _Camera) -> None:
     view = camera.view.model_dump(exclude_none=True)
     where = f"{file.path.name} [camera]"

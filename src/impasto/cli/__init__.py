@@ -11,6 +11,7 @@ from impasto.cli.app import app
 # In the order in which the help lists them.
 COMMANDS = (
     "simulate",
+    "calibrate",
     "stack",
     "fit",
     "render",

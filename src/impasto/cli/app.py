@@ -115,3 +115,21 @@ def pair(text: str, option: str, do: str) -> tuple[int, int]:
     except ValueError:
         raise OptionError(Problem(f"{option} {text}", "is not two whole numbers", do)) from None
     return first, second
+
+
+def numbers(text: str, count: int, option: str) -> tuple[float, ...]:
+    """Return the numbers, separated by commas, that the value of an option holds.
+
+    Raises
+    ------
+    OptionError
+        If they are not as many as `count`.
+    """
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) != count:
+        what = f"is not {count} numbers separated by commas"
+        raise OptionError(Problem(f"{option} {text}", what, "See --help for what each is"))
+    return values

@@ -116,7 +116,7 @@ class ErrorAccumulator:
         self._margin = (first[-2 * _MARGIN :].copy(), second[-2 * _MARGIN :].copy())
         if first.shape[0] < WINDOW or first.shape[1] < WINDOW:
             return
-        _, full = structural_similarity(  # type: ignore[no-untyped-call]
+        _, full = structural_similarity(
             first, second, win_size=WINDOW, data_range=1.0, channel_axis=-1, full=True
         )
         self._ssim_sum += float(full[_MARGIN:-_MARGIN, _MARGIN:-_MARGIN].sum(dtype=np.float64))

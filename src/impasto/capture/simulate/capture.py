@@ -18,7 +18,7 @@ from impasto.capture.simulate.calibration import Studio, write_calibration
 from impasto.capture.simulate.camera import Sensor
 from impasto.capture.simulate.files import ENDINGS, write_image
 from impasto.capture.simulate.illumination import Scene
-from impasto.capture.simulate.manifest import manifest
+from impasto.capture.simulate.manifest import simulated_manifest
 from impasto.capture.simulate.measured import read_measured
 from impasto.capture.simulate.painting.relief import Grid
 from impasto.capture.simulate.presets import PRESETS, SAMPLES, Order, paint_sample
@@ -223,7 +223,10 @@ def simulate(
     write_truth(folder / "truth", scene, placed, files, _description(settings))
     # The manifest of the folder itself comes last: it says that all is there.
     for ev, place in reversed(exposures):
-        text = manifest(files, placed, scene.camera, sensor, ev=ev, exposure_s=_EXPOSURE_S * 2.0**ev)
+        exposure_s = _EXPOSURE_S * 2.0**ev
+        text = simulated_manifest(
+            files, placed, scene.camera, sensor, ev=ev, exposure_s=_EXPOSURE_S * 2.0**ev
+        )
         write_text(place / MANIFEST, text)
     return Simulation(
         folder=folder,

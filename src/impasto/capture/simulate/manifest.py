@@ -1,4 +1,4 @@
-"""The light files of a simulated capture: the TOML manifest and the .lp file."""
+"""The TOML manifest of a simulated capture."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from impasto.capture.manifest import manifest, toml_number
 from impasto.capture.simulate.camera import Sensor
 from impasto.geometry import Camera, Lights
 
 
-def manifest(
+def simulated_manifest(
     files: Sequence[str],
     lights: Lights,
     camera: Camera,
@@ -19,7 +20,7 @@ def manifest(
     ev: float = 0.0,
     exposure_s: float,
 ) -> str:
-    """Return the TOML manifest of a folder of photographs.
+    """Return the TOML manifest of a folder of simulated photographs.
 
     Parameters
     ----------
@@ -38,24 +39,9 @@ def manifest(
     ``gain`` is the image value of a perfect white diffuser that faces the light, so that a fit's diffuse
     magnitudes come out as albedo whatever the exposure was.
     """
-    lines = ["[camera]", f"view = {_list(camera.view_direction)}"]
-    if camera.distance_mm is not None:
-        lines.append(f"distance_mm = {_number(camera.distance_mm)}")
-    if camera.mm_per_px is not None:
-        lines.append(f"mm_per_px = {_number(camera.mm_per_px)}")
-    lines += ["", "[photographs]", *_photographs(sensor)]
-    for row, file in enumerate(files):
-        lines += ["", "[[light]]", f'file = "{file}"']
-        if np.isfinite(lights.position_mm[row]).all():
-            lines.append(f"position_mm = {_list(lights.position_mm[row])}")
-        else:
-            lines.append(f"direction = {_list(lights.direction[row])}")
-        gain = lights.intensity[row] * sensor.exposure * 2.0**ev
-        lines.append(f"gain = {_list(gain) if gain.size > 1 else _number(gain[0])}")
-        if np.isfinite(lights.angular_size_deg[row]):
-            lines.append(f"angular_size_deg = {_number(lights.angular_size_deg[row])}")
-        lines.append(f"exposure_s = {_number(exposure_s)}")
-    return "\n".join(lines) + "\n"
+    gain = lights.intensity * sensor.exposure * 2.0**ev
+    exposed = Lights(lights.names, lights.direction, lights.position_mm, gain, lights.angular_size_deg)
+    return manifest(files, exposed, camera, _photographs(sensor), exposure_s=exposure_s)
 
 
 def _photographs(sensor: Sensor) -> list[str]:
@@ -66,29 +52,12 @@ def _photographs(sensor: Sensor) -> list[str]:
         lines.append(f'transfer = "{sensor.response}"')
     if np.isfinite(sensor.full_scale):
         # As stored in the files; just below full scale, part of the noise is already cut off.
-        lines.append(f"clip_level = {_number(np.floor(0.99 * sensor.full_scale))}")
+        lines.append(f"clip_level = {toml_number(np.floor(0.99 * sensor.full_scale))}")
     if sensor.noisy:
         # Eight bits round, and JPEG blurs, more than the sensor scatters.
         read, relative = (max(sensor.read, 1e-3), 5e-3) if sensor.dtype == "uint8" else (sensor.read, 0.0)
-        photon = _number(sensor.photon)
+        photon = toml_number(sensor.photon)
         lines.append(
-            f"noise = {{ read = {_number(read)}, photon = {photon}, relative = {_number(relative)} }}"
+            f"noise = {{ read = {toml_number(read)}, photon = {photon}, relative = {toml_number(relative)} }}"
         )
     return lines
-
-
-def light_positions(files: Sequence[str], lights: Lights) -> str:
-    """Return the lights' directions as an .lp file: a count, then file x y z per line."""
-    rows = [
-        f"{file} {x:.9f} {y:.9f} {z:.9f}" for file, (x, y, z) in zip(files, lights.direction, strict=True)
-    ]
-    return "\n".join([str(len(rows)), *rows]) + "\n"
-
-
-def _list(numbers: np.ndarray) -> str:
-    return "[" + ", ".join(_number(number) for number in numbers) + "]"
-
-
-def _number(number: float) -> str:
-    """Return a float that TOML reads back as a float, shortest form that keeps it exactly."""
-    return repr(float(number))

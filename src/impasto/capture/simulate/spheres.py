@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from impasto.capture.simulate.illumination import light_at
 from impasto.geometry import Array, Camera, Lights, pixel_position_mm
@@ -14,6 +15,11 @@ MM_PER_PX = 0.5
 # A lamp's housing is seen in a mirror even where the painting takes the lamp for a point.
 _LEAST_LAMP_DEG = 5.0
 _LAMP_RADIANCE = 20.0
+_CLOTH = 0.01
+CARD_MM = (0.0, 44.0)
+"""Where the middle of a white card lies, 9 mm wide and high."""
+_CARD_MM = 9.0
+_FINE = 4
 
 
 def table(camera: Camera) -> str:
@@ -38,7 +44,7 @@ def table(camera: Camera) -> str:
 
 
 def radiance(camera: Camera, lights: Lights, light: int) -> Array:
-    """Return two chrome spheres on black cloth under one light, seen without perspective.
+    """Return two chrome spheres and a white card on black cloth under one light, without perspective.
 
     Parameters
     ----------
@@ -57,10 +63,25 @@ def radiance(camera: Camera, lights: Lights, light: int) -> Array:
     lamp, a small disc with soft edges, or the dim studio.
     """
     height, width = SPHERES_PX
-    view = camera.view_direction
     flat = pixel_position_mm(slice(0, height), slice(0, width), height, width, MM_PER_PX)
     place = np.column_stack([flat.astype(np.float64), np.zeros(len(flat))])
-    image = np.full((height * width, 1), 0.01)
+    image, lamp = _seen(place, camera, lights, light)
+    fine = np.flatnonzero(lamp)
+    # A lamp's image is a few pixels wide, each of which collects what falls on all of its area.
+    offset = (np.arange(_FINE) + 0.5) / _FINE - 0.5
+    offsets = np.array([(x, y, 0.0) for x in offset for y in offset]) * MM_PER_PX
+    parts = (place[fine, None] + offsets).reshape(-1, 3)
+    image[fine] = _seen(parts, camera, lights, light)[0].reshape(-1, len(offsets)).mean(axis=1)
+    return np.asarray(image.reshape(height, width, 1) * np.broadcast_to(lights.intensity[light], 3))
+
+
+def _seen(place: Array, camera: Camera, lights: Lights, light: int) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the radiance seen at places on the plane (N, 3), and where the lamp is in it or close by."""
+    view = camera.view_direction
+    card = (np.abs(place[:, :2] - CARD_MM) <= _CARD_MM / 2).all(axis=1)
+    direction, fall_off = light_at(lights, light, place)
+    image = np.where(card, direction[..., 2] * fall_off, _CLOTH)
+    near = np.zeros(len(place), bool)
     lamp_deg = max(_LEAST_LAMP_DEG, float(np.nan_to_num(lights.angular_size_deg[light])))
     for x, y in CENTRES_MM:
         centre = np.array([x, y, RADIUS_MM])
@@ -74,5 +95,6 @@ def radiance(camera: Camera, lights: Lights, light: int) -> Array:
         off_deg = np.degrees(np.arccos(np.clip(np.sum(mirror * towards, axis=-1), -1, 1)))
         lamp = np.clip(1.5 - off_deg / (lamp_deg / 2), 0, 1)
         studio = 0.02 + 0.03 * np.maximum(mirror[:, 2], 0)
-        image[hit] = (studio + _LAMP_RADIANCE * lamp)[:, None]
-    return np.asarray(image.reshape(height, width, 1) * np.broadcast_to(lights.intensity[light], 3))
+        image[hit] = studio + _LAMP_RADIANCE * lamp
+        near[hit] = off_deg < lamp_deg + np.degrees(2 * MM_PER_PX / RADIUS_MM)
+    return image, near

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from impasto.capture.manifest import light_positions
 from impasto.capture.simulate.files import write_image
 from impasto.capture.simulate.illumination import Scene
 from impasto.capture.simulate.lamps import named
-from impasto.capture.simulate.manifest import light_positions
 from impasto.capture.simulate.materials import SHAPES
 from impasto.capture.simulate.surface import Surface
 from impasto.colour import encode_srgb, quantise
