@@ -10,6 +10,7 @@ use crate::observations::Stack;
 use crate::paper::{PaperFit, Sample};
 use crate::record::{FitGroup, Layout};
 use crate::render::{Parameters, View, render_group};
+use crate::slopes;
 use rayon::prelude::*;
 use std::sync::LazyLock;
 
@@ -211,6 +212,16 @@ macro_rules! dispatch {
                 _ => return false,
             }
             true
+        }
+
+        /// The basis functions and their slopes; `None` if no model has the name.
+        pub fn basis_slopes(name: &str, view: &slopes::View, optics: &Optics) -> Option<Vec<f64>> {
+            match name {
+                $(
+                    $name => Some(slopes::basis_slopes::<$model, { 2 + <$model>::SHAPE.len() }>(view, optics)),
+                )*
+                _ => None,
+            }
         }
 
         /// Diffuse and specular basis values in f64, for golden values; `None` if no model has the name.

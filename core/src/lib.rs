@@ -23,4 +23,5 @@ mod python;
 mod record;
 mod render;
 mod separable;
+mod slopes;
 mod start;

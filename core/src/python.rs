@@ -9,6 +9,7 @@ use crate::paper::Sample;
 use crate::record::Layout;
 use crate::render::{Parameters, View};
 use crate::separable::Loss;
+use crate::slopes;
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -322,8 +323,45 @@ fn basis<'py>(
     Ok(values.into_pyarray(py).reshape([rows, width])?.into_any())
 }
 
+/// Basis functions of pixels under lights, with their slopes; see `impasto.fit.information`.
+#[pyfunction]
+#[pyo3(signature = (model, normal, shape, *, light_direction, light_position_mm, view_direction, camera_distance_mm,
+    position_mm, index, fresnel))]
+#[allow(clippy::too_many_arguments)]
+fn basis_slopes<'py>(
+    py: Python<'py>,
+    model: &str,
+    normal: PyReadonlyArray2<f64>,
+    shape: PyReadonlyArray2<f64>,
+    light_direction: PyReadonlyArray2<f64>,
+    light_position_mm: PyReadonlyArray2<f64>,
+    view_direction: [f64; 3],
+    camera_distance_mm: Option<f64>,
+    position_mm: Option<PyReadonlyArray2<f32>>,
+    index: f64,
+    fresnel: &str,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (name, _) = parse_model(model)?;
+    let entry = dispatch::entries().into_iter().find(|entry| entry.name == name).expect("parsed from this list");
+    let optics = parse_optics(index, fresnel)?;
+    let lights = parse_places(&light_direction, &light_position_mm)?;
+    let pixels = normal.as_array().nrows();
+    check("normal", normal.len(), 3 * pixels)?;
+    check("shape", shape.len(), entry.shape.len() * pixels)?;
+    let camera = parse_camera(view_direction, camera_distance_mm);
+    let position_mm = position_mm.as_ref().map(|array| array.as_slice()).transpose()?;
+    if camera.near() || lights.iter().any(Place::near) {
+        check("position_mm", position_mm.map_or(0, <[f32]>::len), 2 * pixels)?;
+    }
+    let view =
+        slopes::View { normal: normal.as_slice()?, shape: shape.as_slice()?, lights: &lights, camera, position_mm };
+    let slopes = py.detach(|| dispatch::basis_slopes(name, &view, &optics)).expect("parsed from this list");
+    let shape = [pixels, lights.len(), 1 + entry.lobes, 3 + entry.shape.len()];
+    Ok(slopes.into_pyarray(py).reshape(shape)?.into_any())
+}
+
 #[pymodule]
 mod _core {
     #[pymodule_export]
-    use super::{available_instructions, basis, fit, instructions, models, render};
+    use super::{available_instructions, basis, basis_slopes, fit, instructions, models, render};
 }

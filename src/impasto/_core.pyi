@@ -60,3 +60,16 @@ def basis(
     index: float,
     fresnel: str,
 ) -> NDArray[np.float64]: ...
+def basis_slopes(
+    model: str,
+    normal: NDArray[np.float64],
+    shape: NDArray[np.float64],
+    *,
+    light_direction: NDArray[np.float64],
+    light_position_mm: NDArray[np.float64],
+    view_direction: NDArray[np.float64],
+    camera_distance_mm: float | None,
+    position_mm: NDArray[np.float32] | None,
+    index: float,
+    fresnel: str,
+) -> NDArray[np.float64]: ...

@@ -132,21 +132,47 @@ def read_pixels(fit: Fit, rows: slice, columns: slice) -> Pixels:
     names += ["view_tilt"] if "view_tilt" in fit.names else []
     maps = fit.read(rows, columns, names)
     height, width = maps["normal"].shape[:2]
-    count = height * width
-    flat = {name: np.ascontiguousarray(values.reshape(count, -1)) for name, values in maps.items()}
-    row, column = np.divmod(np.arange(count), width)
+    row, column = np.divmod(np.arange(height * width), width)
+    return pixels_of_maps(fit.attributes, fit.shape, row + rows.start, column + columns.start, maps)
+
+
+def pixels_of_maps(
+    attributes: Mapping[str, Any],
+    size: tuple[int, int],
+    row: NDArray[np.intp],
+    column: NDArray[np.intp],
+    maps: Mapping[str, NDArray[Any]],
+) -> Pixels:
+    """Return fitted maps as pixels side by side.
+
+    Parameters
+    ----------
+    attributes : mapping
+        Of the fit.
+    size : tuple of int
+        Height and width of the painting in pixels.
+    row, column : ndarray of shape (P,), int
+        Where the pixels lie.
+    maps : mapping of str to ndarray of shape (P[, k]) or (rows, columns[, k])
+    """
+    spec = parse_model(attributes["model"])
+    count = len(row)
+
+    def flat(name: str) -> Map:
+        return np.ascontiguousarray(maps[name].reshape(count, -1))
+
     none = np.empty((count, 0), np.float32)
     return Pixels(
-        attributes=fit.attributes,
-        size=fit.shape,
-        row=row + rows.start,
-        column=column + columns.start,
-        normal=flat["normal"],
-        diffuse=flat["diffuse"],
-        specular=flat.get("specular", none),
-        shape=np.concatenate([none, *(flat[name] for name in spec.shape_names)], axis=1),
-        ambient=flat.get("ambient"),
-        view_tilt=flat["view_tilt"][:, 0] if "view_tilt" in flat else None,
+        attributes=attributes,
+        size=size,
+        row=row,
+        column=column,
+        normal=flat("normal"),
+        diffuse=flat("diffuse"),
+        specular=flat("specular") if spec.lobes else none,
+        shape=np.concatenate([none, *(flat(name) for name in spec.shape_names)], axis=1),
+        ambient=flat("ambient") if spec.ambient else None,
+        view_tilt=flat("view_tilt")[:, 0] if "view_tilt" in maps else None,
     )
 
 
@@ -176,7 +202,7 @@ def render_pixels(pixels: Pixels, lights: Lights, camera: Camera) -> NDArray[np.
     normal, position = pixels.normal, None
     view_tilt, arm_azimuth = pixels.view_tilt, 0.0
     if lights.near or camera.distance_mm is not None:
-        position = _position(pixels, camera)
+        position = pixel_positions_mm(pixels, camera)
     if view_tilt is not None:
         arm_azimuth = np.radians(pixels.attributes["sample"]["arm_azimuth_deg"])
         view_tilt = np.where(matte[:, 0], np.float32(0.0), view_tilt)
@@ -205,7 +231,14 @@ def render_pixels(pixels: Pixels, lights: Lights, camera: Camera) -> NDArray[np.
     )
 
 
-def _position(pixels: Pixels, camera: Camera) -> NDArray[np.float32]:
+def pixel_positions_mm(pixels: Pixels, camera: Camera) -> NDArray[np.float32]:
+    """Return where pixels lie on the painting, shape (P, 2), in mm.
+
+    Raises
+    ------
+    OptionError
+        If the size of a pixel is not known.
+    """
     if camera.mm_per_px is None:
         raise OptionError(
             Problem(
