@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from impasto.maps import maps
     from impasto.psychophysics import experiment
     from impasto.render import render
+    from impasto.report import report
     from impasto.stack import stack
     from impasto.store import open
 
@@ -47,6 +48,7 @@ __all__ = [
     "models",
     "open",
     "render",
+    "report",
     "simulate",
     "stack",
 ]
@@ -69,6 +71,7 @@ _HOME = {
     "models": "models",
     "open": "store",
     "render": "render",
+    "report": "report",
     "simulate": "capture.simulate",
     "stack": "stack",
 }

@@ -93,7 +93,7 @@ def write_page(summary: DemoSummary, truth: Path) -> None:
     if sweep.animation:
         caption = "Rendered from the fit under a light that moves along the arm, from -66° to 66°"
         shown.append(Picture(sweep.animation.read_bytes(), caption, "image/webp"))
-    page.section("The painting").pictures(shown, wide=True)
+    page.section("The painting").pictures(shown, columns=2)
 
     part = page.section("Lights that the fit has not seen")
     part.text(
@@ -114,7 +114,7 @@ def write_page(summary: DemoSummary, truth: Path) -> None:
     previews = {entry.name: entry.preview for entry in chosen.maps}
     part.pictures(
         [Picture(previews[name].read_bytes(), _caption(name)) for name in _SHOWN_MAPS if name in previews],
-        wide=True,
+        columns=2,
     )
     statuses = dict.fromkeys(status for model in summary.fitted.models for status in model.pixels)
     part.table(

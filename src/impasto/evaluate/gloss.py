@@ -18,14 +18,14 @@ from scipy.interpolate import RegularGridInterpolator
 from impasto.band_writers import BandWriter
 from impasto.evaluate.clusters import choose_regions
 from impasto.evaluate.glossmeter import GLOSSMETERS, Glossmeter, quadrature
-from impasto.evaluate.regions import Sample, check_inside, sample_regions
+from impasto.evaluate.regions import WHOLE, Sample, check_inside, sample_regions
 from impasto.geometry import Array, Camera, Lights
 from impasto.maps.pictures import draw_values
 from impasto.models import ModelSpec, basis, parse_model
 from impasto.output import prepare_folder
 from impasto.pixels import Pixels, read_pixels
 from impasto.progress import progress
-from impasto.store import Fit, open_fit, open_stack
+from impasto.store import Fit, Stack, open_fit, open_stack
 
 _BAND_ROWS = 256
 _PREVIEW_PX = 1600
@@ -169,15 +169,38 @@ def gloss(
     found = [_region(name, sample, tables) for name, sample in samples.items()]
     found += [_pixel(fit, column, row, tables) for column, row in pixels]
     files = _write_maps(folder, fit, tables, stack.absolute, show_progress) if folder else ()
+    return _summary(stack, spec.name, found, tuple(files), started)
+
+
+def sample_gloss(pixels: Pixels, stack: Stack) -> GlossSummary:
+    """Predict the readings of a glossmeter from some pixels of a fit, as `gloss` does for the whole painting.
+
+    Parameters
+    ----------
+    pixels : Pixels
+        Spread over the painting.
+    stack : Stack
+        The photographs that they were fitted to.
+    """
+    started = time.perf_counter()
+    tables = [PixelGloss(pixels.model, pixels.attributes, meter) for meter in GLOSSMETERS]
+    known = int(pixels.whole.sum())
+    sample = Sample(pixels.select(pixels.whole), known, len(pixels) - known)
+    return _summary(stack, pixels.model.name, [_region(WHOLE, sample, tables)], (), started)
+
+
+def _summary(
+    stack: Stack, model: str, found: Sequence[RegionGloss], files: tuple[Path, ...], started: float
+) -> GlossSummary:
     reach = facet_angles_deg(stack.lights, stack.camera)
     return GlossSummary(
-        store=Path(store),
-        model=spec.name,
+        store=stack.store,
+        model=model,
         absolute=stack.absolute,
         facet_angle_deg=reach,
         extrapolated_deg=tuple(m.angle_deg for m in GLOSSMETERS if not reach[0] <= m.angle_deg <= reach[1]),
         regions=tuple(found),
-        files=tuple(files),
+        files=files,
         seconds=time.perf_counter() - started,
     )
 

@@ -17,7 +17,7 @@ from impasto.evaluate.clusters import choose_regions, write_regions
 from impasto.evaluate.compare import ordered_fits
 from impasto.evaluate.curve_plot import draw_curve
 from impasto.evaluate.curves import Curve, CurveSums, columns
-from impasto.evaluate.regions import Regions, check_inside
+from impasto.evaluate.regions import WHOLE, Regions, check_inside, sample_regions
 from impasto.evaluate.telling import telling_pixels
 from impasto.models import parse_model
 from impasto.output import prepare_folder, write_text
@@ -26,6 +26,7 @@ from impasto.progress import progress
 from impasto.store import Fit, Stack, open_fit, open_stack
 
 _TILE_ROWS, _TILE_COLUMNS = 256, 512
+_SAMPLED = 20_000
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,8 @@ def gonio(
     folder = prepare_folder(out)
     places = {f"pixel {column},{row}": (column, row) for column, row in pixels}
     if not places and divided is None:
-        places = telling_pixels(fits[names[0]], stack, show=show_progress)
+        sample = sample_regions(fits[names[0]], None, _SAMPLED, show=show_progress)
+        places = telling_pixels(sample[WHOLE].pixels, fits[names[0]], stack)
     curves = [pixel_curve(name, *place, stack, fits) for name, place in places.items()]
     files: list[Path] = []
     if divided is not None:

@@ -6,41 +6,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.errors import OptionError, Problem
-from impasto.evaluate.regions import WHOLE, sample_regions
 from impasto.geometry import Array
 from impasto.models import basis
 from impasto.pixels import Pixels, luminance, render_pixels
 from impasto.store import Fit, Stack
 
-_SAMPLED = 20_000
 _BAND_ROWS = 256
 # By the rank of the height of their highlight, and of what the model leaves unexplained.
 _BY_HIGHLIGHT = {"high highlight": 0.99, "typical highlight": 0.5, "low highlight": 0.01}
 _BY_RESIDUAL = {"poorly described": 0.99}
 
 
-def telling_pixels(fit: Fit, stack: Stack, *, show: bool | None) -> dict[str, tuple[int, int]]:
+def telling_pixels(pixels: Pixels, fit: Fit, stack: Stack) -> dict[str, tuple[int, int]]:
     """Return a pixel with a high, a typical and a low highlight, and one that the model describes poorly.
 
     Parameters
     ----------
+    pixels : Pixels
+        Those to choose from.
     fit : Fit
+        Theirs.
     stack : Stack
-    show : bool or None
-        Whether to show a progress bar.
 
     Returns
     -------
     dict of str to (int, int)
         Column and row, by what the pixel tells. They are the 99th, 50th and 1st percentile of the highlight's
-        height, and the 99th of the residual over the pixel's mean radiance, of 20,000 pixels.
+        height, and the 99th of the residual over the pixel's mean radiance.
 
     Raises
     ------
     OptionError
         If no pixel has all its parameters.
     """
-    sample = sample_regions(fit, None, _SAMPLED, show=show)[WHOLE].pixels
+    sample = pixels.select(pixels.whole)
     if not len(sample):
         raise OptionError(
             Problem(

@@ -18,6 +18,7 @@ from impasto.output import written_whole
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
 
 _DPI = 100
 _SHORTEST_PX = 900
@@ -77,17 +78,59 @@ def draw_values(
     norm = LogNorm(low, high) if logarithmic else Normalize(low, high)
     image = axes.imshow(shown, cmap=colour_map, norm=norm, interpolation="nearest")
     below, above = bool((finite < low).any()), bool((finite > high).any())
-    extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
-    box = side.get_position()
-    bar = figure.add_axes(
-        (box.x0 + box.width * 0.12, box.y0 + box.height * 0.1, box.width * 0.16, box.height * 0.86)
-    )
-    colour_bar = figure.colorbar(image, cax=bar, extend=extend[below, above])
+    bar = _colour_bar(figure, side, image, label, below, above)
     if logarithmic:
         _label_decades(bar, narrow=high < 100 * low)
-    colour_bar.set_label(label, color=_INK, fontsize=_TEXT_PT)
-    bar.tick_params(labelsize=_TEXT_PT, which="both")
     if not np.isfinite(values).all():
+        _legend(side, [(_MISSING, "no value")])
+    _save(figure, path)
+
+
+def draw_difference(
+    path: Path,
+    difference: NDArray[np.floating],
+    *,
+    title: str,
+    limit: float,
+    mm_per_px: float | None = None,
+    px_per_px: int = 1,
+) -> None:
+    """Draw a signed difference around white, with its colour bar and a bar for lengths on the painting.
+
+    Parameters
+    ----------
+    path : Path
+        PNG file to write.
+    difference : ndarray of shape (H, W), float
+        NaN where there is none.
+    title : str
+    limit : float
+        Magnitude at the ends of the colour bar; what is beyond is drawn as this.
+    mm_per_px : float, optional
+        Size of a pixel on the painting; without it the bar counts pixels.
+    px_per_px : int, optional
+        How many pixels of the painting a pixel of the picture stands for, along a side.
+    """
+    from matplotlib import colormaps
+
+    height, width = difference.shape
+    figure, axes, side = _canvas(height, width, title, side_px=200)
+    # Orange and purple stay apart for the common colour deficiencies, and on paper.
+    colour_map = colormaps["PuOr"].with_extremes(bad=_MISSING)
+    shown = np.where(np.isfinite(difference), np.clip(difference, -limit, limit), np.nan)
+    image = axes.imshow(shown, cmap=colour_map, vmin=-limit, vmax=limit, interpolation="nearest")
+    finite = difference[np.isfinite(difference)]
+    below, above = bool((finite < -limit).any()), bool((finite > limit).any())
+    _colour_bar(figure, side, image, "relative radiance", below, above)
+    length, unit = _round_length(width * (mm_per_px or px_per_px)), "mm" if mm_per_px else "px"
+    on_picture = length / (mm_per_px or px_per_px)
+    start, base = 0.03 * width, 0.95 * height
+    axes.plot([start, start + on_picture], [base, base], color=_INK, linewidth=4, solid_capstyle="butt")
+    axes.text(
+        start, base - 0.02 * height, f"{length:g} {unit}", va="bottom", fontsize=_TEXT_PT, color=_INK,
+        bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 2},
+    )  # fmt: skip
+    if not np.isfinite(difference).all():
         _legend(side, [(_MISSING, "no value")])
     _save(figure, path)
 
@@ -189,6 +232,25 @@ def draw_status(
     ]
     _legend(side, entries, top=True)
     _save(figure, path)
+
+
+def _colour_bar(figure: Figure, side: Axes, image: AxesImage, label: str, below: bool, above: bool) -> Axes:
+    """Draw the colour bar at the side, pointed where values lie beyond it, and return its axes."""
+    extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+    box = side.get_position()
+    bar = figure.add_axes(
+        (box.x0 + box.width * 0.12, box.y0 + box.height * 0.1, box.width * 0.16, box.height * 0.86)
+    )
+    colour_bar = figure.colorbar(image, cax=bar, extend=extend[below, above])
+    colour_bar.set_label(label, color=_INK, fontsize=_TEXT_PT)
+    bar.tick_params(labelsize=_TEXT_PT, which="both")
+    return bar
+
+
+def _round_length(whole: float) -> float:
+    """Return a length of 1, 2 or 5 times a power of ten, about a fifth of the whole."""
+    decade = 10.0 ** np.floor(np.log10(whole / 5))
+    return float(decade * max(step for step in (1, 2, 5) if step * decade <= whole / 5))
 
 
 def _label_decades(bar: Axes, narrow: bool) -> None:

@@ -81,15 +81,23 @@ class Section:
             items = "".join(f"<li>{escape(note)}</li>" for note in notes)
             self._parts.append(f'<div class="notes"><strong>{escape(title)}</strong><ul>{items}</ul></div>')
 
-    def pictures(self, pictures: Sequence[Picture], *, wide: bool = False) -> None:
-        """Add pictures side by side, `wide` for those with writing in them."""
+    def pictures(self, pictures: Sequence[Picture], *, columns: int = 3) -> None:
+        """Add pictures side by side.
+
+        Parameters
+        ----------
+        pictures : sequence of Picture
+        columns : {3, 2, 1}, optional
+            How many stand in a row of a wide page: three plain pictures, two with a legend, one plot. On
+            paper, pictures with writing have a row of their own.
+        """
         figures = "".join(
             f'<figure><img src="data:{picture.kind};base64,{base64.b64encode(picture.data).decode()}" '
             f'alt="{escape(picture.alt or picture.caption)}">'
             f"<figcaption>{escape(picture.caption)}</figcaption></figure>"
             for picture in pictures
         )
-        self._parts.append(f'<div class="row{" wide" if wide else ""}">{figures}</div>')
+        self._parts.append(f'<div class="row of{columns}">{figures}</div>')
 
     def table(
         self,
@@ -105,7 +113,7 @@ class Section:
         Parameters
         ----------
         header : sequence of str
-            The columns' names.
+            The columns' names; empty where the first column says what the second is.
         rows : sequence of sequence of str
             The cells, as they shall be read.
         caption : str
@@ -116,6 +124,7 @@ class Section:
             Whether the cells are words rather than figures, which stand flush right.
         """
         head = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in header)
+        head = f"<thead><tr>{head}</tr></thead>" if head else ""
         body = "".join(
             f"<tr{' class=total' if total and index == len(rows) - 1 else ''}>"
             f'<th scope="row">{escape(row[0])}</th>'
@@ -127,7 +136,7 @@ class Section:
         self._parts.append(
             f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(caption)}">'
             f"<table{' class=words' if words else ''}><caption>{escape(caption)}</caption>"
-            f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
+            f"{head}<tbody>{body}</tbody></table></div>"
         )
 
     def html(self) -> str:

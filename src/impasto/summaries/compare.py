@@ -10,27 +10,33 @@ from impasto.summaries.words import Row, count, percent
 
 if TYPE_CHECKING:
     from impasto.evaluate.compare import CompareSummary
+    from impasto.evaluate.tally import RegionComparison
 
 
 def compare_tables(summary: CompareSummary) -> Iterator[tuple[str, Row, list[Row]]]:
     """Yield for each region a heading, the columns' names, and a row per model."""
-    header = ("model", "unknowns", "RMS / mean", "at highlights", "elsewhere", "As/Ad", "chosen")
     for region in summary.regions:
-        rows: list[Row] = []
-        for model in region.models:
-            ratio = model.ratio
-            told = "" if ratio is None else f"{ratio.mean:.4g} ({ratio.low:.3g} – {ratio.high:.3g})"
-            errors = (model.rms, model.rms_highlight, model.rms_elsewhere)
-            rows.append(
-                (
-                    model.model,
-                    str(model.unknowns),
-                    *("no light" if math.isnan(error) else f"{error:.4f}" for error in errors),
-                    told,
-                    percent(model.chosen),
-                )
+        yield f"{region.name}: {count(region.pixels, 'pixel')}", *comparison_rows(region)
+
+
+def comparison_rows(region: RegionComparison) -> tuple[Row, list[Row]]:
+    """Return the columns' names, and a row per model."""
+    header = ("model", "unknowns", "RMS / mean", "at highlights", "elsewhere", "As/Ad", "chosen")
+    rows: list[Row] = []
+    for model in region.models:
+        ratio = model.ratio
+        told = "" if ratio is None else f"{ratio.mean:.4g} ({ratio.low:.3g} – {ratio.high:.3g})"
+        errors = (model.rms, model.rms_highlight, model.rms_elsewhere)
+        rows.append(
+            (
+                model.model,
+                str(model.unknowns),
+                *("no light" if math.isnan(error) else f"{error:.4f}" for error in errors),
+                told,
+                percent(model.chosen),
             )
-        yield f"{region.name}: {count(region.pixels, 'pixel')}", header, rows
+        )
+    return header, rows
 
 
 def compare_lines(summary: CompareSummary) -> Iterator[str]:

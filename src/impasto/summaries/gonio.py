@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from impasto.summaries.words import Row, count
 
 if TYPE_CHECKING:
+    from impasto.evaluate.curves import Curve
     from impasto.evaluate.gonio import GonioSummary
 
 
 def gonio_table(summary: GonioSummary) -> tuple[Row, list[Row]]:
     """Return the columns' names, and a row per place and model: its signed errors by band."""
+    return curve_rows(summary.curves)
+
+
+def curve_rows(curves: Sequence[Curve]) -> tuple[Row, list[Row]]:
+    """Return the same for some curves."""
     rows: list[Row] = []
-    for curve in summary.curves:
+    for curve in curves:
         for name, model in curve.models.items():
             errors = ["no light" if e is None else f"{100 * e:+.2f} %" for e in model.signed_error.values()]
             width = "none" if math.isnan(curve.half_width_deg) else f"{curve.half_width_deg:.1f}°"
