@@ -1,3 +1,4 @@
+import { resolve } from "node:path";
 import { defineConfig } from "vitest/config";
 
 // Every page and library is an entry. Names of entries are public: pages of others refer to them.
@@ -7,10 +8,19 @@ const ENTRIES = {
 };
 
 export default defineConfig({
+  resolve: {
+    alias: [
+      {
+        find: /^numcodecs\/(blosc|lz4|zstd)$/,
+        replacement: resolve(import.meta.dirname, "src/store/codec-left-out.ts"),
+      },
+    ],
+  },
   base: "./", // a published folder may lie anywhere below a host
   build: {
     outDir: "../src/impasto/web",
     emptyOutDir: true,
+    manifest: "manifest.json", // `impasto publish` copies what its page needs
     target: "es2022",
     assetsInlineLimit: 0, // the pages' content security policy allows no data: addresses but for pictures
     modulePreload: { polyfill: false },

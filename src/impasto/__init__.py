@@ -24,10 +24,12 @@ if TYPE_CHECKING:
     from impasto.geometry import Camera, Lights
     from impasto.maps import maps
     from impasto.psychophysics import experiment
+    from impasto.publish import publish
     from impasto.render import render
     from impasto.report import report
     from impasto.stack import stack
     from impasto.store import open
+    from impasto.view import view
 
     __version__: str
 
@@ -47,10 +49,12 @@ __all__ = [
     "maps",
     "models",
     "open",
+    "publish",
     "render",
     "report",
     "simulate",
     "stack",
+    "view",
 ]
 
 # Where each name is found when it is asked for: a stage does not import what the others need.
@@ -70,10 +74,12 @@ _HOME = {
     "maps": "maps",
     "models": "models",
     "open": "store",
+    "publish": "publish",
     "render": "render",
     "report": "report",
     "simulate": "capture.simulate",
     "stack": "stack",
+    "view": "view",
 }
 
 

@@ -21,6 +21,8 @@ COMMANDS = (
     "gonio",
     "gloss",
     "report",
+    "view",
+    "publish",
     "models",
     "demo",
 )

@@ -80,6 +80,9 @@ class Rendition:
         Of the pictures: 1 where grey radiance is shown with sRGB's curve, else 3.
     profile : bytes
         The ICC profile that the pictures carry.
+    matrix : ndarray of shape (3, K) or None
+        From the terms of the radiance, times the exposure, to the light of each primary; None where these
+        are the same.
     """
 
     def __init__(
@@ -102,7 +105,7 @@ class Rendition:
         curves = getattr(self.display, "curves", None)
         self.channels = 1 if channels == 1 and isinstance(curves, SrgbCurves) else 3
         self.profile = profile("srgb", grey=True) if self.channels == 1 else self.display.profile
-        self._matrix: NDArray[np.float32] | None = None
+        self.matrix: NDArray[np.float32] | None = None
         self._black = np.zeros(self.channels, np.float32)
         if self.channels == 3:
             shown_white = self.display.matrix.sum(axis=1) + self.display.black
@@ -113,13 +116,13 @@ class Rendition:
             self._black = np.linalg.solve(self.display.matrix, self.display.black).astype(np.float32)
             unity = matrix.shape == (3, 3) and np.allclose(matrix, np.eye(3), rtol=0, atol=1e-9)
             if not unity or self._black.any():
-                self._matrix = matrix.astype(np.float32)
+                self.matrix = matrix.astype(np.float32)
 
     def __call__(self, radiance: NDArray[np.float32]) -> Shown:
         """Return the picture of radiance of shape (H, W, C)."""
         linear = np.minimum(radiance * self._exposure, np.float32(_BRIGHTEST))
-        if self._matrix is not None:
-            linear = colour_terms(linear, self._matrix.shape[1]) @ self._matrix.T - self._black
+        if self.matrix is not None:
+            linear = colour_terms(linear, self.matrix.shape[1]) @ self.matrix.T - self._black
         peak = linear[..., 0]
         for primary in range(1, linear.shape[-1]):
             peak = np.maximum(peak, linear[..., primary])

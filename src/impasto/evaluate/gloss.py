@@ -245,12 +245,19 @@ class PixelGloss:
     attributes : mapping
         Attributes of the fit: its optics.
     meter : Glossmeter
+
+    Attributes
+    ----------
+    axes : list of ndarray
+        Values of each shape parameter in the table.
+    grid : ndarray of shape (len(axis), ..., 1 + lobes)
+        Gloss units per unit of albedo and of each lobe's magnitude.
     """
 
     def __init__(self, model: ModelSpec, attributes: Mapping[str, Any], meter: Glossmeter) -> None:
         shape = model.shape
         count = _GRID[len(shape)]
-        axes = [np.geomspace(parameter.lower, parameter.upper, count) for parameter in shape]
+        self.axes = axes = [np.geomspace(parameter.lower, parameter.upper, count) for parameter in shape]
         light, view, weight = meter.rays(quadrature(13, 4))
         normal = np.broadcast_to([0.0, 0.0, 1.0], light.shape)
         table = []
@@ -264,7 +271,7 @@ class PixelGloss:
                 **_optics(attributes),
             )
             table.append(meter.gloss(weight @ np.column_stack([diffuse, specular]) / len(light)))
-        grid = np.reshape(table, (*(len(axis) for axis in axes), -1))
+        self.grid = grid = np.reshape(table, (*(len(axis) for axis in axes), -1))
         self._constant = grid.reshape(-1) if not axes else None
         if axes:
             # Readings vary over decades with the width of the lobe.

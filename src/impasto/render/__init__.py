@@ -26,7 +26,7 @@ from impasto.progress import progress
 from impasto.render.animation import Animation
 from impasto.render.display import requested_rendition
 from impasto.render.lights import requested_lights
-from impasto.store import Fit, open_fit, open_stack
+from impasto.store import Fit, PublishedStack, Stack, is_published, open_fit, open_published, open_stack
 
 _BAND_BYTES = 192e6
 """What the parameters of a band and its renderings may take; the rest of the process needs about 0.3 GB."""
@@ -124,7 +124,7 @@ def render(
     Parameters
     ----------
     store : path
-        Store with a fit of `model`.
+        Store with a fit of `model`, or a published store with that model.
     model : str
         Name of the model.
     lights : path or Lights, optional
@@ -173,8 +173,7 @@ def render(
     """
     started = time.perf_counter()
     spec = parse_model(model)
-    fit = open_fit(Path(store), spec.name)
-    stack = open_stack(Path(store))
+    fit, stack = _open(Path(store), spec.name)
     _, height, width, channels = stack.shape
     if isinstance(lights, Lights):
         wanted = lights
@@ -244,6 +243,12 @@ def render(
         out_of_gamut=out_of_gamut,
         seconds=time.perf_counter() - started,
     )
+
+
+def _open(store: Path, model: str) -> tuple[Fit, Stack | PublishedStack]:
+    if is_published(store):
+        return open_published(store, model)
+    return open_fit(store, model), open_stack(store)
 
 
 class _Pictures(ExitStack):

@@ -15,14 +15,14 @@ from impasto.colour.displays import Display, display_p3, srgb_display
 from impasto.colour.icc_display import icc_display
 from impasto.colour.rendition import HIGHLIGHT_RULES, HighlightRule, Rendition
 from impasto.errors import OptionError, Problem, raise_problems
-from impasto.store import Stack
+from impasto.store import PublishedStack, Stack
 
 _NAMED = {"srgb": srgb_display, "display-p3": display_p3}
 _LIGHT = "light"
 
 
 def requested_rendition(
-    stack: Stack,
+    stack: Stack | PublishedStack,
     *,
     display: str | PathLike[str] | Display,
     exposure: float,
@@ -106,7 +106,7 @@ def requested_display(display: str | PathLike[str] | Display) -> Display:
 
 
 def _white_xyz(
-    white_point: str | tuple[float, float] | None, camera: CameraColour, stack: Stack
+    white_point: str | tuple[float, float] | None, camera: CameraColour, stack: Stack | PublishedStack
 ) -> NDArray[np.float64]:
     if white_point is None:
         return camera.white_xyz

@@ -40,6 +40,7 @@ from impasto.store.layout import (
     unit_at,
     units,
 )
+from impasto.store.published import PublishedStack, is_published, open_published
 from impasto.store.stack_writer import StackHeader, StackWriter
 from impasto.store.stacks import Stack, open_stack
 
@@ -60,6 +61,7 @@ __all__ = [
     "Map",
     "Maps",
     "MapsWriter",
+    "PublishedStack",
     "RunLog",
     "Stack",
     "StackHeader",
@@ -72,12 +74,14 @@ __all__ = [
     "fit_group",
     "fit_maps",
     "fitted_models",
+    "is_published",
     "level_sizes",
     "lights",
     "log_path",
     "no_room",
     "open",
     "open_fit",
+    "open_published",
     "open_stack",
     "provenance",
     "read_evaluation",

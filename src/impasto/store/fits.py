@@ -183,6 +183,11 @@ class Fit:
         height, width = self._arrays["status"].shape
         return height, width
 
+    def map_attributes(self, name: str) -> tuple[Attributes, int]:
+        """Return the attributes of a map, and how many values it has per pixel."""
+        array = self._arrays[name]
+        return dict(array.attrs), array.shape[2] if len(array.shape) > 2 else 1
+
     def read(self, rows: slice, columns: slice, names: Iterable[str] | None = None) -> Maps:
         """Return maps of a tile.
 

@@ -1,0 +1,184 @@
+/** Tiles on the graphics card: loaded on demand, nearest first, cancelled when no longer wanted, bounded in memory. */
+
+import { isAbort, type StoreProblem } from "../store/errors";
+import type { Layer, PublishedStore } from "../store/published";
+import { nearest } from "./program";
+
+/** Browsers open no more connections to a host by HTTP/1.1. */
+const AT_ONCE = 6;
+const RETRY_MS = 5000;
+
+export interface TileKey {
+  readonly layer: Layer;
+  readonly level: number;
+  readonly row: number;
+  readonly column: number;
+}
+
+export interface Tile extends TileKey {
+  readonly texture: WebGLTexture;
+  readonly bytes: number;
+  /** Texels of four codes per pixel. */
+  readonly blocks: number;
+  /** Pixels of the picture that the tile holds. */
+  readonly width: number;
+  readonly height: number;
+  used: number;
+}
+
+export function keyOf({ layer, level, row, column }: TileKey): string {
+  return `${layer.id}/${level}/${row}/${column}`;
+}
+
+export function blocksOf(layer: Layer): number {
+  return Math.ceil(layer.columns.length / 4);
+}
+
+/** Bytes of one tile on the graphics card. */
+export function bytesOf(layer: Layer): number {
+  return layer.chunk * layer.chunk * blocksOf(layer) * 8;
+}
+
+export class Tiles {
+  readonly #there = new Map<string, Tile>();
+  readonly #loading = new Map<string, AbortController>();
+  readonly #failed = new Map<string, number>();
+  #wanted: TileKey[] = [];
+  #frame = 0;
+  #bytes = 0;
+  /** Called when a tile has come. */
+  onload: (tile: Tile, codes: Uint16Array) => void = () => {};
+  onproblem: (problem: StoreProblem) => void = () => {};
+
+  constructor(
+    readonly gl: WebGL2RenderingContext,
+    readonly store: PublishedStore,
+    public limit: number,
+  ) {}
+
+  get bytes(): number {
+    return this.#bytes;
+  }
+  get pending(): number {
+    return this.#loading.size + this.#wanted.length;
+  }
+
+  /** Starts a frame: tiles used from now on are not dropped for others of the same frame. */
+  begin(): void {
+    this.#frame++;
+  }
+
+  get(key: TileKey): Tile | undefined {
+    const tile = this.#there.get(keyOf(key));
+    if (tile) tile.used = this.#frame;
+    return tile;
+  }
+
+  /** Loads these tiles, the first first, and gives up on all others. */
+  want(keys: readonly TileKey[]): void {
+    const now = performance.now();
+    const names = new Set<string>();
+    this.#wanted = [];
+    for (const key of keys) {
+      const name = keyOf(key);
+      if (names.has(name)) continue;
+      names.add(name);
+      const failed = this.#failed.get(name);
+      if (this.#there.has(name) || this.#loading.has(name) || (failed && now - failed < RETRY_MS)) continue;
+      this.#wanted.push(key);
+    }
+    for (const [name, controller] of this.#loading) {
+      if (!names.has(name)) {
+        controller.abort();
+        this.#loading.delete(name);
+      }
+    }
+    this.#next();
+  }
+
+  dispose(): void {
+    this.#wanted = [];
+    for (const controller of this.#loading.values()) controller.abort();
+    for (const tile of this.#there.values()) this.gl.deleteTexture(tile.texture);
+    this.#there.clear();
+  }
+
+  #next(): void {
+    while (this.#loading.size < AT_ONCE) {
+      const key = this.#wanted.shift();
+      if (!key) return;
+      void this.#load(key);
+    }
+  }
+
+  async #load(key: TileKey): Promise<void> {
+    const name = keyOf(key);
+    const controller = new AbortController();
+    this.#loading.set(name, controller);
+    try {
+      const codes = await this.store.chunk(key.layer, key.level, key.row, key.column, controller.signal);
+      if (controller.signal.aborted) return;
+      this.#failed.delete(name);
+      const tile = this.#upload(key, codes);
+      this.#there.set(name, tile);
+      this.#bytes += tile.bytes;
+      this.#evict();
+      this.#loading.delete(name);
+      this.onload(tile, codes);
+    } catch (error) {
+      if (controller.signal.aborted || isAbort(error)) return;
+      this.#failed.set(name, performance.now());
+      this.onproblem(error as StoreProblem);
+    } finally {
+      if (this.#loading.get(name) === controller) this.#loading.delete(name);
+      this.#next();
+    }
+  }
+
+  #upload(key: TileKey, codes: Uint16Array): Tile {
+    const { gl } = this;
+    const { layer } = key;
+    const blocks = blocksOf(layer);
+    const texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA16UI, layer.chunk * blocks, layer.chunk);
+    const data = padded(codes, layer.columns.length, blocks);
+    const size = [layer.chunk * blocks, layer.chunk] as const;
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, ...size, gl.RGBA_INTEGER, gl.UNSIGNED_SHORT, data);
+    nearest(gl);
+    const [height, width] = this.store.size(key.level);
+    return {
+      ...key,
+      texture,
+      bytes: bytesOf(layer),
+      blocks,
+      width: Math.min(layer.chunk, width - key.column * layer.chunk),
+      height: Math.min(layer.chunk, height - key.row * layer.chunk),
+      used: this.#frame,
+    };
+  }
+
+  #evict(): void {
+    if (this.#bytes <= this.limit) return;
+    const oldest = [...this.#there].filter(([, tile]) => tile.used < this.#frame);
+    oldest.sort(([, a], [, b]) => a.used - b.used);
+    for (const [name, tile] of oldest) {
+      if (this.#bytes <= this.limit) return;
+      this.gl.deleteTexture(tile.texture);
+      this.#there.delete(name);
+      this.#bytes -= tile.bytes;
+    }
+  }
+}
+
+/** Returns codes with `columns` per pixel as `blocks` groups of four, the rest of the last group 0. */
+export function padded(codes: Uint16Array, columns: number, blocks: number): Uint16Array {
+  const stride = 4 * blocks;
+  if (stride === columns) return codes;
+  const pixels = codes.length / columns;
+  const result = new Uint16Array(pixels * stride);
+  for (let pixel = 0, from = 0, to = 0; pixel < pixels; pixel++, to += stride - columns) {
+    for (let i = 0; i < columns; i++) result[to++] = codes[from++]!;
+  }
+  return result;
+}
