@@ -117,13 +117,16 @@ def test_the_grey_scale_shows_its_listed_reflectances(finished):
     assert dark.mean() < 1e-4
     with open(folder / "calibration" / "grey_scale.csv", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 12
+    assert len(rows) == 20
+    # The scale is exposed so that its white just does not clip, and the card beside it a stop less.
+    even = tifffile.imread(folder / "calibration" / "grey_scale_card.tif").mean() / 65535
+    assert 2 * even == pytest.approx(0.8 * capture.lights.direction[frontal, 2], rel=1e-3)
     for row in rows:
         top, left, bottom, right = (
             int(row[edge]) for edge in ("row0_px", "column0_px", "row1_px", "column1_px")
         )
-        patch = image[top:bottom, left:right].mean() / white
-        assert patch == pytest.approx(float(row["reflectance"]), rel=0.01)
+        patch = image[top:bottom, left:right].mean() / (2 * even)
+        assert patch == pytest.approx(10 ** -float(row["density"]), rel=0.02)
 
 
 def test_the_colour_chart_shows_its_listed_tristimulus_values(finished):

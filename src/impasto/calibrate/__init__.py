@@ -11,7 +11,8 @@ from impasto.lazy import make_lazy
 
 if TYPE_CHECKING:
     from impasto.calibrate.lights import lights
+    from impasto.calibrate.oecf import oecf
 
-__all__ = ["lights"]
+__all__ = ["lights", "oecf"]
 
-make_lazy(__name__, {"lights": "lights"})
+make_lazy(__name__, {"lights": "lights", "oecf": "oecf"})

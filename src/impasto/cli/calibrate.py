@@ -10,12 +10,20 @@ import typer
 from impasto import calibrate
 from impasto.cli.app import Debug, Json, Out, group, numbers
 from impasto.console import reporting
-from impasto.summaries.calibrate import lights_lines, lights_table
+from impasto.summaries.calibrate import lights_lines, lights_table, oecf_lines
 
 commands = group("calibrate", "Calibrate camera, lights and display from photographs of what is known.")
 
 Exclude = Annotated[
     list[str] | None, typer.Option("--exclude", metavar="NAME", help="Leave it out; may be repeated.")
+]
+Dark = Annotated[
+    Path | None, typer.Option("--dark", metavar="PHOTO", help="Photograph with the cap on the lens.")
+]
+Patches = Annotated[Path, typer.Argument(metavar="CSV", help="Where its patches are, and what is known.")]
+CalibrationFile = Annotated[Path, typer.Argument(metavar="OUT", help="Calibration file to write.")]
+Without = Annotated[
+    list[str] | None, typer.Option("--without", metavar="PATCH", help="Patch to leave out; may be repeated.")
 ]
 
 
@@ -72,4 +80,42 @@ def lights(
         )
         report.table(*lights_table(found))
         report.say_all(lights_lines(found))
+        report.done(found)
+
+
+@commands.command(
+    epilog="Example: impasto calibrate oecf scale.tif scale.csv oecf.json --card card.tif --dark dark.tif"
+)
+def oecf(
+    photo: Annotated[Path, typer.Argument(metavar="PHOTO", help="Photograph of a grey scale.")],
+    patches: Patches,
+    out: CalibrationFile,
+    more: Annotated[
+        list[Path] | None,
+        typer.Option("--photo", metavar="PHOTO", help="The same with another exposure; may be repeated."),
+    ] = None,
+    card: Annotated[
+        Path | None, typer.Option("--card", metavar="PHOTO", help="An even card in the scale's place.")
+    ] = None,
+    dark: Dark = None,
+    exposure_s: Annotated[
+        list[float] | None,
+        typer.Option("--exposure-s", metavar="S", help="Exposure time of each photograph, if not in it."),
+    ] = None,
+    without: Without = None,
+    json: Json = None,
+    debug: Debug = False,
+) -> None:
+    """Measure the camera's response from a photograph of a grey scale."""
+    with reporting("calibrate oecf", json, debug) as report:
+        found = calibrate.oecf(
+            [photo, *(more or ())],
+            patches,
+            out,
+            card=card,
+            dark=dark,
+            exposures_s=exposure_s or (),
+            without=without or (),
+        )
+        report.say_all(oecf_lines(found))
         report.done(found)

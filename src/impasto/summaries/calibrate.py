@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from impasto.geometry import zenith_azimuth
-from impasto.summaries.words import Row, count
+from impasto.summaries.words import Row, count, percent
 
 if TYPE_CHECKING:
     from impasto.calibrate.lights import LightsCalibration
+    from impasto.calibrate.oecf import Oecf
 
 
 def lights_table(found: LightsCalibration) -> tuple[Row, list[Row]]:
@@ -47,3 +48,21 @@ def lights_lines(found: LightsCalibration) -> Iterator[str]:
     yield from (f"note: {note}" for note in found.notes)
     yield f"{count(len(found.names), 'light')} in {found.folder}: check {found.folder / 'spheres.png'}"
     yield f"next: impasto stack PHOTOS STORE --lights {found.folder / 'lights.toml'}"
+
+
+def oecf_lines(found: Oecf) -> Iterator[str]:
+    """Yield how the camera responds, and how well that is known."""
+    yield f"{count(found.patches, 'patch reading')} over {found.decades:.1f} decades of radiance"
+    yield f"the function follows them within {percent(found.residual)} (root mean square)"
+    yield f"a straight line would be off by up to {percent(found.nonlinearity)}"
+    noise = found.noise
+    yield (
+        f"noise: variance = {noise['read']:.2g}² + {noise['photon']:.2g} · Y + ({noise['relative']:.2g} · Y)²"
+    )
+    for channel, (low, high) in enumerate(found.response.measured):
+        top = found.response(found.response.measured.T)[1, channel]
+        yield f"channel {channel + 1}: measured from code {low:.0f} to {high:.0f}, {top:.0%} of full scale"
+    yield from (f"note: {note}" for note in found.notes)
+    yield f"{found.file} is ready; look at {found.plot}"
+    if not found.linear:
+        yield f"next: impasto stack PHOTOS STORE --oecf {found.file}"

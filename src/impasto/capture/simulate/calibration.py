@@ -17,6 +17,8 @@ from impasto.geometry import Array, Camera, Lights, pixel_position_mm
 from impasto.images import Compression
 from impasto.output import prepare_folder, write_text
 
+_WHITE_OF_CHART = 0.8
+
 
 @dataclass(frozen=True)
 class Studio:
@@ -27,6 +29,8 @@ class Studio:
     lights : Lights
     camera : Camera
     sensor : Sensor
+    size : (int, int)
+        Height and width of a photograph.
     ending : str
         Of the image files.
     compression : {'zstd', 'deflate', 'lzw', 'none'}
@@ -36,6 +40,7 @@ class Studio:
     lights: Lights
     camera: Camera
     sensor: Sensor
+    size: tuple[int, int]
     ending: str
     compression: Compression
     seed: int
@@ -56,35 +61,41 @@ def write_calibration(folder: Path, studio: Studio) -> None:
     """
     prepare_folder(folder / "spheres")
     tables: dict[str, Callable[[], str]] = {
-        "grey_scale.csv": lambda: charts.grey_scale().table(),
-        "colour_chart.csv": lambda: charts.colour_chart().table(),
+        "grey_scale.csv": lambda: charts.grey_scale().table(studio.size),
+        "colour_chart.csv": lambda: charts.colour_chart().table(studio.size),
         "spheres/spheres.csv": lambda: spheres.table(studio.camera),
     }
     for name, table in tables.items():
         if not (folder / name).exists():
             write_text(folder / name, table())
-    for shot, (name, radiance) in enumerate(_shots(studio)):
+    for shot, (name, radiance, ev) in enumerate(_shots(studio)):
         path = folder / (name + studio.ending)
         if not path.exists():
             rng = np.random.default_rng((studio.seed, 3, shot))
-            write_image(path, studio.sensor.expose(radiance(), rng), studio.compression)
+            write_image(path, studio.sensor.expose(radiance(), rng, ev), studio.compression)
 
 
-def _shots(studio: Studio) -> Iterator[tuple[str, Callable[[], Array]]]:
-    """Yield each shot's name with the function that gives its radiance."""
-    yield "dark", lambda: np.zeros((*charts.CARD_PX, 3))
-    yield "white_card", lambda: _card(studio)
-    yield "grey_scale", lambda: charts.grey_scale().image * _card(studio)
-    yield "colour_chart", lambda: charts.colour_chart().image * _card(studio)
+def _shots(studio: Studio) -> Iterator[tuple[str, Callable[[], Array], float]]:
+    """Yield each shot's name, the function that gives its radiance, and its exposure in stops."""
+    size, frontal = studio.size, studio.frontal
+    yield "dark", lambda: np.zeros((*size, 3)), 0
+    yield "white_card", partial(_card, studio, frontal), 0
+    # A chart is exposed so that its white just does not clip.
+    full = np.log2(_WHITE_OF_CHART / (studio.sensor.exposure * studio.lights.intensity[frontal].max()))
+    yield "grey_scale", lambda: charts.grey_scale().image(size) * _card(studio, frontal), full
+    yield "grey_scale_card", partial(_card, studio, frontal), full - 1  # within the range of the scale
+    yield "colour_chart", lambda: charts.colour_chart().image(size) * _card(studio, frontal), 0
     for light, name in enumerate(studio.lights.names):
-        yield f"spheres/{name}", partial(spheres.radiance, studio.camera, studio.lights, light)
+        yield f"spheres/{name}", partial(spheres.radiance, studio.camera, studio.lights, light), 0
+        if studio.lights.near:
+            yield f"flat/{name}", partial(_card, studio, light), 0
 
 
-def _card(studio: Studio) -> Array:
-    """Return the radiance of a perfect white diffuser that fills the frame, under the most frontal light."""
-    height, width = charts.CARD_PX
-    light = studio.frontal
-    flat = pixel_position_mm(slice(0, height), slice(0, width), height, width, charts.FRAME_MM / height)
+def _card(studio: Studio, light: int) -> Array:
+    """Return the radiance of a perfect white diffuser that fills the frame, under one light."""
+    height, width = studio.size
+    px = studio.camera.mm_per_px or 1.0
+    flat = pixel_position_mm(slice(0, height), slice(0, width), height, width, px)
     place = np.column_stack([flat.astype(np.float64), np.zeros(len(flat))])
     direction, fall_off = light_at(studio.lights, light, place)
     shade = np.broadcast_to(direction[..., 2] * fall_off, len(place)).reshape(height, width, 1)

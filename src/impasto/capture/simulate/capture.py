@@ -218,7 +218,7 @@ def simulate(
                 write_image(path, image, compression)
             advance(1)
     if calibration:
-        studio = Studio(placed, scene.camera, sensor, ending, compression, seed)
+        studio = Studio(placed, scene.camera, sensor, (size[1], size[0]), ending, compression, seed)
         write_calibration(folder / "calibration", studio)
     write_truth(folder / "truth", scene, placed, files, _description(settings))
     # The manifest of the folder itself comes last: it says that all is there.

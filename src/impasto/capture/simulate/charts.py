@@ -9,8 +9,6 @@ import numpy as np
 
 from impasto.geometry import Array
 
-CARD_PX = (240, 360)
-FRAME_MM = 100.0
 _COLUMNS = 6
 _CARD_REFLECTANCE = 0.03
 
@@ -32,11 +30,10 @@ class Chart:
     reflectance: Array
     known: dict[str, Array]
 
-    @property
-    def boxes(self) -> list[tuple[int, int, int, int]]:
-        """Each patch's first row, first column, end row and end column in pixels."""
+    def boxes(self, size: tuple[int, int]) -> list[tuple[int, int, int, int]]:
+        """Return first row, first column, end row and end column of each patch in an image of (H, W)."""
         rows = -(-len(self.names) // _COLUMNS)
-        height, width = CARD_PX
+        height, width = size
         boxes = []
         for number in range(len(self.names)):
             row, column = divmod(number, _COLUMNS)
@@ -46,18 +43,17 @@ class Chart:
             ))  # fmt: skip
         return boxes
 
-    @property
-    def image(self) -> Array:
-        """The chart's reflectance, ndarray of shape (H, W, 3)."""
-        image = np.full((*CARD_PX, 3), _CARD_REFLECTANCE)
-        for (top, left, bottom, right), reflectance in zip(self.boxes, self.reflectance, strict=True):
+    def image(self, size: tuple[int, int]) -> Array:
+        """Return the chart's reflectance, ndarray of shape (H, W, 3)."""
+        image = np.full((*size, 3), _CARD_REFLECTANCE)
+        for (top, left, bottom, right), reflectance in zip(self.boxes(size), self.reflectance, strict=True):
             image[top:bottom, left:right] = reflectance
         return image
 
-    def table(self) -> str:
+    def table(self, size: tuple[int, int]) -> str:
         """Return the chart as CSV: name, box, and what is known."""
         lines = [",".join(["patch", "row0_px", "column0_px", "row1_px", "column1_px", *self.known])]
-        for number, (name, box) in enumerate(zip(self.names, self.boxes, strict=True)):
+        for number, (name, box) in enumerate(zip(self.names, self.boxes(size), strict=True)):
             values = [f"{values[number]:.6f}" for values in self.known.values()]
             lines.append(",".join([name, *(str(edge) for edge in box), *values]))
         return "\n".join(lines) + "\n"
@@ -65,10 +61,10 @@ class Chart:
 
 @cache
 def grey_scale() -> Chart:
-    """Return a grey scale of twelve steps, equal in cube root, from 98 % to 2 %."""
-    reflectance = np.linspace(np.cbrt(0.98), np.cbrt(0.02), 12) ** 3
-    names = tuple(f"grey {number}" for number in range(1, 13))
-    return Chart(names, np.repeat(reflectance[:, None], 3, axis=1), {"reflectance": reflectance})
+    """Return a grey scale of 20 steps of density 0.15, from 98 % to 0.14 %: 2.85 decades."""
+    density = -np.log10(0.98) + 0.15 * np.arange(20)
+    names = tuple(f"grey {number}" for number in range(1, 21))
+    return Chart(names, np.repeat(10 ** -density[:, None], 3, axis=1), {"density": density})
 
 
 @cache
