@@ -10,9 +10,16 @@ from typing import TYPE_CHECKING
 from impasto.lazy import make_lazy
 
 if TYPE_CHECKING:
+    from impasto.calibrate.colour import colour
+    from impasto.calibrate.dark import dark
+    from impasto.calibrate.display import display
+    from impasto.calibrate.flat import flat
+    from impasto.calibrate.glare import glare
     from impasto.calibrate.lights import lights
     from impasto.calibrate.oecf import oecf
+    from impasto.calibrate.steadiness import steadiness
+    from impasto.calibrate.white import white
 
-__all__ = ["lights", "oecf"]
+__all__ = ["colour", "dark", "display", "flat", "glare", "lights", "oecf", "steadiness", "white"]
 
-make_lazy(__name__, {"lights": "lights", "oecf": "oecf"})
+make_lazy(__name__, {name: name for name in __all__})
