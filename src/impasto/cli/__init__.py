@@ -20,6 +20,7 @@ COMMANDS = (
     "compare",
     "gonio",
     "gloss",
+    "experiment",
     "report",
     "view",
     "publish",

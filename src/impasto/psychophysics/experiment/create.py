@@ -24,6 +24,7 @@ from impasto.psychophysics.experiment.angles import (
     named_angles,
 )
 from impasto.psychophysics.experiment.candidates import Candidate, group_candidates, model_candidates
+from impasto.psychophysics.experiment.database import ANSWERS
 from impasto.psychophysics.experiment.groups import Groups, read_groups
 from impasto.psychophysics.experiment.manifest import (
     PHOTOGRAPH,
@@ -44,7 +45,6 @@ from impasto.psychophysics.experiment.pictures import Pictures, Sample
 from impasto.store import Stack, fitted_models, open_fit, open_stack, provenance
 
 DESIGNS = ("models", "angle-groups")
-ANSWERS = "answers.sqlite"
 _ANGLES = 7
 _LONGEST_PX = 400
 _LONGEST_LIMITS = (32, 4096)

@@ -1,0 +1,39 @@
+"""What the subcommands of `experiment` say when they are done."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from impasto.summaries.words import count, seconds
+
+if TYPE_CHECKING:
+    from impasto.psychophysics.experiment.administer import ExportSummary
+    from impasto.psychophysics.experiment.create import CreateSummary
+
+
+def create_lines(summary: CreateSummary) -> Iterator[str]:
+    """Yield what an experiment consists of, and what to know before observers are invited."""
+    width, height = summary.size_px
+    yield (
+        f"{count(len(summary.samples), 'sample')}, {count(len(summary.conditions), 'condition')} "
+        f"({', '.join(summary.conditions)}), {count(len(summary.angles), 'angle')}"
+    )
+    highlight = ", ".join(summary.with_highlight) or "none"
+    yield f"angles: {', '.join(summary.angles)}; with a highlight: {highlight}"
+    yield (
+        f"{count(summary.pairs, 'comparison')} for each observer, {summary.trials} trials with practice, "
+        "repeats and catch trials"
+    )
+    yield (
+        f"{count(summary.stimuli, 'picture')} of up to {width} x {height} px, {summary.rendered} made now "
+        f"({seconds(summary.seconds)})"
+    )
+    for note in summary.notes:
+        yield f"note: {note}"
+
+
+def export_lines(summary: ExportSummary) -> Iterator[str]:
+    """Yield what was written."""
+    answers, observers = count(summary.answers, "answer"), count(summary.observers, "observer")
+    yield f"{answers} of {observers} in {summary.file}"
