@@ -4,6 +4,8 @@ import { defineConfig } from "vitest/config";
 // Every page and library is an entry. Names of entries are public: pages of others refer to them.
 const ENTRIES = {
   viewer: "index.html",
+  experiment: "experiment.html",
+  "experiment-admin": "experiment-admin.html",
   "impasto-viewer": "src/impasto-viewer.ts",
 };
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from laboratory import ADMIN_TOKEN, new_postgresql_database
+from laboratory import ADMIN_TOKEN, free_port, new_postgresql_database
 
 import impasto
 from impasto.psychophysics.experiment.database import database_url, open_database
@@ -62,7 +62,7 @@ def postgresql(tmp_path_factory) -> Iterator[str]:
     folder = tmp_path_factory.mktemp("postgresql")
     password = secrets.token_urlsafe(12)
     (folder / "password").write_text(password)
-    port = _free_port()
+    port = free_port()
     as_user: list[str] = []
     if os.geteuid() == 0:  # PostgreSQL refuses to run as root
         as_user = ["setpriv", "--reuid=postgres", "--regid=postgres", "--clear-groups"]
@@ -85,14 +85,6 @@ def postgresql(tmp_path_factory) -> Iterator[str]:
         yield f"postgresql://impasto:{password}@127.0.0.1:{port}"
     finally:
         run(programs / "pg_ctl", "-D", data, "-w", "-m", "immediate", "stop")
-
-
-def _free_port() -> int:
-    import socket
-
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])

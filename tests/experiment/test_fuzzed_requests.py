@@ -57,4 +57,5 @@ def test_nothing_that_can_be_asked_makes_the_server_fail(fuzzed, mode):
 
         ask()
     assert {200, 422} <= statuses
-    assert not {401, 429} & statuses
+    # What is made up to be wrong may replace the header with the code.
+    assert not statuses & ({429} if mode is GenerationMode.NEGATIVE else {401, 429})
