@@ -8,7 +8,7 @@ NODE   := viewer/node_modules/.installed
 WEB    := src/impasto/web/.built
 PAGES  := $(wildcard viewer/*.*) $(shell find viewer/src viewer/public -type f 2>/dev/null)
 
-.PHONY: demo test test-rust test-viewer test-python check bench lock clean browser
+.PHONY: demo test test-rust test-viewer test-python check bench lock clean browser postgresql
 
 demo: $(VENV)/.built $(WEB)
 	$(BIN)/impasto demo
@@ -21,7 +21,7 @@ test-rust:
 test-viewer: $(NODE)
 	npm --prefix viewer test
 
-test-python: $(VENV)/.built $(WEB) browser
+test-python: $(VENV)/.built $(WEB) browser postgresql
 	$(BIN)/pytest
 
 check: $(VENV)/.built $(NODE)
@@ -60,6 +60,12 @@ browser:
 	@command -v chromium >/dev/null || { \
 	  apt=$$(command -v apt-get) && [ "$$(id -u)" = 0 ] || apt="sudo $$apt"; \
 	  $$apt update --quiet && $$apt install --yes --quiet --no-install-recommends chromium; }
+
+# The tests of the experiment start a PostgreSQL server of their own.
+postgresql:
+	@ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || command -v initdb >/dev/null || { \
+	  apt=$$(command -v apt-get) && [ "$$(id -u)" = 0 ] || apt="sudo $$apt"; \
+	  $$apt update --quiet && $$apt install --yes --quiet --no-install-recommends postgresql; }
 
 # Lock files hold versions and hashes, never download addresses. Needs uv.
 lock:
