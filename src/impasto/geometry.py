@@ -135,6 +135,29 @@ class Lights:
         """Whether any light stands at a finite distance."""
         return bool(np.isfinite(self.position_mm).any())
 
+    def irradiance(self, position_mm: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+        """Return the irradiance of surfaces that face the lights.
+
+        Parameters
+        ----------
+        position_mm : ndarray of shape (P, 2), optional
+            Where they lie on the painting, X and Y; by default, at its centre.
+
+        Returns
+        -------
+        ndarray of shape (L, P or 1, C), float32
+            Intensity, and for lights at a finite distance their fall-off |p|² / |p − x|².
+        """
+        intensity = self.intensity[:, None, :].astype(np.float32)
+        if position_mm is None or not self.near:
+            return intensity
+        place = np.pad(np.asarray(position_mm, np.float64), ((0, 0), (0, 1)))
+        squares = np.square(self.position_mm[:, None, :] - place).sum(axis=-1)
+        falloff = np.square(self.position_mm).sum(axis=-1)[:, None] / squares
+        falloff[~np.isfinite(self.position_mm).all(axis=1)] = 1.0
+        result: NDArray[np.float32] = intensity * falloff[:, :, None].astype(np.float32)
+        return result
+
     def select(self, index: ArrayLike | slice) -> Lights:
         """Return the lights at `index` (integers, a slice or a boolean mask), in that order."""
         rows = np.arange(len(self))[index if isinstance(index, slice) else np.asarray(index)]

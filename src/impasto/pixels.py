@@ -13,6 +13,7 @@ from impasto import _core
 from impasto.errors import OptionError, Problem
 from impasto.geometry import Array, Camera, Lights, position_mm, turn_about_z
 from impasto.models import ModelSpec, parse_model
+from impasto.residual import ResidualTerm
 from impasto.store import Fit
 
 Map = NDArray[np.float32]
@@ -20,7 +21,7 @@ Map = NDArray[np.float32]
 # Rec. 709: luminance of linear sRGB.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
-_PER_PIXEL = ("row", "column", "normal", "diffuse", "specular", "shape", "ambient", "view_tilt")
+_PER_PIXEL = ("row", "column", "normal", "diffuse", "specular", "shape", "ambient", "view_tilt", "residual")
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,8 @@ class Pixels:
         For models with the term.
     view_tilt : ndarray of shape (P,) or None
         The view of each pixel, in the plane of the arm, as the paper's procedure has it in its literal form.
+    residual : ndarray of shape (P, K), uint16, or None
+        Codes of what the model leaves over; None leaves it away.
     """
 
     attributes: Mapping[str, Any]
@@ -55,6 +58,7 @@ class Pixels:
     shape: Map
     ambient: Map | None
     view_tilt: Map | None
+    residual: NDArray[np.uint16] | None = None
 
     def __len__(self) -> int:
         return len(self.row)
@@ -90,9 +94,9 @@ class Pixels:
         """Which pixels have all their parameters."""
         return ~self.missing & ~self.matte
 
-    def select(self, index: ArrayLike) -> Pixels:
-        """Return the pixels at `index` (integers or a boolean mask), in that order."""
-        index = np.asarray(index)
+    def select(self, index: ArrayLike | slice) -> Pixels:
+        """Return the pixels at `index` (integers, a slice or a boolean mask), in that order."""
+        index = index if isinstance(index, slice) else np.asarray(index)
         columns = {name: getattr(self, name) for name in _PER_PIXEL}
         chosen: dict[str, Any] = {
             name: None if values is None else values[index] for name, values in columns.items()
@@ -117,8 +121,16 @@ def luminance(values: NDArray[np.floating]) -> Array:
     return result
 
 
-def read_pixels(fit: Fit, rows: slice, columns: slice) -> Pixels:
+def read_pixels(fit: Fit, rows: slice, columns: slice, *, residual: bool = False) -> Pixels:
     """Return the pixels of a tile, row by row.
+
+    Parameters
+    ----------
+    fit : Fit
+    rows, columns : slice
+        The tile.
+    residual : bool, optional
+        Whether to read what the model leaves over too, where the fit describes it.
 
     Raises
     ------
@@ -130,6 +142,7 @@ def read_pixels(fit: Fit, rows: slice, columns: slice) -> Pixels:
     names += ["specular"] if spec.lobes else []
     names += ["ambient"] if spec.ambient else []
     names += ["view_tilt"] if "view_tilt" in fit.names else []
+    names += ["residual"] if residual and "residual" in fit.names else []
     maps = fit.read(rows, columns, names)
     height, width = maps["normal"].shape[:2]
     row, column = np.divmod(np.arange(height * width), width)
@@ -158,7 +171,7 @@ def pixels_of_maps(
     spec = parse_model(attributes["model"])
     count = len(row)
 
-    def flat(name: str) -> Map:
+    def flat(name: str) -> NDArray[Any]:
         return np.ascontiguousarray(maps[name].reshape(count, -1))
 
     none = np.empty((count, 0), np.float32)
@@ -173,13 +186,15 @@ def pixels_of_maps(
         shape=np.concatenate([none, *(flat(name) for name in spec.shape_names)], axis=1),
         ambient=flat("ambient") if spec.ambient else None,
         view_tilt=flat("view_tilt")[:, 0] if "view_tilt" in maps else None,
+        residual=flat("residual") if "residual" in maps else None,
     )
 
 
 def render_pixels(pixels: Pixels, lights: Lights, camera: Camera) -> NDArray[np.float32]:
     """Return the relative radiance of pixels under lights.
 
-    A pixel whose highlight the photographs do not tell is rendered without one.
+    A pixel whose highlight the photographs do not tell is rendered without one. What the model leaves over is
+    added where the pixels have it.
 
     Parameters
     ----------
@@ -211,7 +226,7 @@ def render_pixels(pixels: Pixels, lights: Lights, camera: Camera) -> NDArray[np.
             turned = turn_about_z(np.pad(position, ((0, 0), (0, 1))), -arm_azimuth)
             position = turned[:, :2].astype(np.float32)
     channels = pixels.diffuse.shape[1]
-    return _core.render(
+    radiance: NDArray[np.float32] = _core.render(
         pixels.model.name,
         normal,
         pixels.diffuse,
@@ -229,6 +244,11 @@ def render_pixels(pixels: Pixels, lights: Lights, camera: Camera) -> NDArray[np.
         index=pixels.attributes["index_of_refraction"],
         fresnel=pixels.attributes["fresnel"],
     )
+    term = None if pixels.residual is None else ResidualTerm.of(pixels.attributes)
+    if term is not None and pixels.residual is not None:
+        irradiance = lights.irradiance(None if position is None else pixel_positions_mm(pixels, camera))
+        term.add(radiance, pixels.residual, lights.direction, irradiance)
+    return radiance
 
 
 def pixel_positions_mm(pixels: Pixels, camera: Camera) -> NDArray[np.float32]:

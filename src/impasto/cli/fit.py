@@ -66,6 +66,24 @@ def fit(
         float | None,
         typer.Option("--shadow-level", metavar="Y", help="Leave out samples darker than this radiance."),
     ] = FitOptions.shadow_level,
+    residual: Annotated[
+        bool,
+        typer.Option("--residual", help="Describe what the model leaves over, over light direction."),
+    ] = FitOptions.residual,
+    residual_components: Annotated[
+        int,
+        typer.Option(
+            "--residual-components", metavar="K", help="Coefficients per pixel of that description."
+        ),
+    ] = FitOptions.residual_components,
+    self_calibrate: Annotated[
+        bool | None,
+        typer.Option(
+            "--self-calibrate/--no-self-calibrate",
+            help="Find the strength of each light from the photographs; by default with --residual.",
+            show_default=False,
+        ),
+    ] = FitOptions.self_calibrate,
     exclude: Annotated[
         list[str] | None,
         typer.Option("--exclude", metavar="NAME", help="Photograph to leave out; may be repeated."),
@@ -86,6 +104,9 @@ def fit(
             refined=refined,
             threshold_deg=_threshold(threshold),
             highlight=highlight,
+            residual=residual,
+            residual_components=residual_components,
+            self_calibrate=self_calibrate,
         )
         more: dict[str, Any] = {"models": tuple(model)} if model else {}
         summary = impasto.fit(

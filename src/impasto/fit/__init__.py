@@ -219,7 +219,8 @@ def _usual_procedure(stack: stores.Stack, spec: ModelSpec, options: FitOptions) 
     if options.refined:
         return Paper(stack, spec, refined)
     used = [number for number, name in enumerate(stack.lights.names) if name not in options.exclude]
-    if not find_arm(stack.lights.direction[used]).planar:
+    joint_only = options.residual or options.calibrates
+    if joint_only or not find_arm(stack.lights.direction[used]).planar:
         return Joint(stack, spec, options)
     try:
         return Paper(stack, spec, refined)

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from impasto import store as stores
 from impasto.arm import find_arm
 from impasto.errors import OptionError, Problem, raise_problems
 from impasto.fit.procedure import Findings, FitOptions
+from impasto.fit.remainder import Remainder, find_remainder, in_blocks, left_over, usual_toe
+from impasto.fit.sample import Sample, sample_pixels
+from impasto.fit.self_calibration import Calibration, self_calibrate
 from impasto.fit.tile import fit_tile
-from impasto.geometry import pixel_position_mm
+from impasto.geometry import Lights, position_mm
 from impasto.models import ModelSpec
+from impasto.pixels import Pixels, pixels_of_maps, render_pixels
 
 _FOREIGN = {"refined": "paper", "threshold_deg": "paper", "highlight": "paper"}
 
@@ -45,9 +51,12 @@ class Joint:
         self._selected = stack.lights.select(self.lights)
         self._camera = stack.camera
         self._light_rgb = stack.light_rgb
-        self.maps = stores.fit_maps(
+        self._remainder: Remainder | None = None
+        *maps, status = stores.fit_maps(
             model.shape_names, lobes=model.lobes, ambient=model.ambient, channels=channels
         )
+        residual = [stores.residual_map(options.residual_components)] if options.residual else []
+        self.maps = (*maps, *residual, status)
         raise_problems(OptionError, self._problems())
 
     def _problems(self) -> list[Problem]:
@@ -88,16 +97,33 @@ class Joint:
         }
 
     def prepare(self, show_progress: bool | None) -> Findings:
-        """Say what lights in one plane leave open; see `Procedure.prepare`."""
-        if not find_arm(self._selected.direction).planar:
-            return Findings()
-        return Findings(
-            notes=(
+        """Find strength and direction of the lights and the residual's process; see `Procedure.prepare`."""
+        notes: tuple[str, ...] = ()
+        attributes: dict[str, Any] = {}
+        if find_arm(self._selected.direction).planar:
+            notes += (
                 "the lights lie in one plane, which does not tell how far a normal tilts out of it, nor Ad "
                 "and As apart from that tilt: they rest on where the joint fit starts. --procedure paper "
                 "--refined says what it assumes instead",
             )
-        )
+        if self._options.residual or self._options.calibrates:
+            sample = _SampledPixels(self, sample_pixels(self._stack, self.lights, show_progress))
+            toe = usual_toe(sample.measured())
+            if self._options.calibrates:
+                calibration = self_calibrate(sample, self._selected, toe)
+                self._selected = calibration.lights
+                attributes["self_calibration"] = calibration.attributes()
+                notes += _calibration_notes(calibration)
+            if self._options.residual:
+                self._remainder = find_remainder(
+                    sample.left_over(self._selected, toe),
+                    self._selected,
+                    toe,
+                    self._options.residual_components,
+                )
+                attributes["residual"] = self._remainder.attributes
+                notes += _residual_notes(self._remainder.attributes)
+        return Findings(attributes, notes)
 
     def conclude(self, read: Callable[..., Iterator[stores.Maps]]) -> Findings:
         """Add nothing; see `Procedure.conclude`."""
@@ -105,13 +131,32 @@ class Joint:
 
     def fit(self, radiance: NDArray[Any], rows: slice, columns: slice) -> stores.Maps:
         """Fit a tile; see `Procedure.fit`."""
+        row, column = np.mgrid[rows.start : rows.stop, columns.start : columns.stop].reshape(2, -1)
+        values = radiance.reshape(len(radiance), -1, radiance.shape[-1])
+        maps = self.fit_pixels(values, row, column, self._selected)
+        remainder = self._remainder
+        if remainder is not None:
+            pixels = self.pixels(maps, row, column)
+            lights = self._selected
+
+            def codes(part: slice) -> NDArray[np.uint16]:
+                rest = self.left_over(values[:, part], pixels.select(part), lights, remainder.toe)
+                return remainder.codes(rest)
+
+            maps[stores.RESIDUAL] = in_blocks(len(pixels), codes)
+        return maps
+
+    def fit_pixels(
+        self, values: NDArray[Any], row: NDArray[np.intp], column: NDArray[np.intp], lights: Lights
+    ) -> stores.Maps:
+        """Fit pixels (L, N, C) that lie at rows and columns, as if lit by `lights`."""
         position = None
         if self._near and self._camera.mm_per_px is not None:
-            position = pixel_position_mm(rows, columns, self._height, self._width, self._camera.mm_per_px)
+            position = position_mm(row, column, self._height, self._width, self._camera.mm_per_px)
         return fit_tile(
             self._model,
-            radiance.reshape(len(radiance), -1, radiance.shape[-1]),
-            lights=self._selected,
+            values,
+            lights=lights,
             camera=self._camera,
             light_rgb=self._light_rgb,
             clip_level=self._stack.clip_level,
@@ -121,3 +166,78 @@ class Joint:
             position_mm=position,
             options=self._options,
         )
+
+    def pixels(self, maps: stores.Maps, row: NDArray[np.intp], column: NDArray[np.intp]) -> Pixels:
+        """Return fitted maps as pixels."""
+        return pixels_of_maps(self.attributes, (self._height, self._width), row, column, maps)
+
+    def measured(self, values: NDArray[Any]) -> NDArray[np.float32]:
+        """Return the radiance of stored values."""
+        return values * np.float32(self._stack.scale) + np.float32(self._stack.offset)
+
+    def clipped(self, measured: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Return which samples of radiance are clipped."""
+        return measured >= self._stack.clip_level.astype(np.float32)
+
+    def render(self, pixels: Pixels, lights: Lights) -> NDArray[np.float32]:
+        """Return the radiance of pixels under lights."""
+        return render_pixels(pixels, lights, self._camera)
+
+    def left_over(
+        self, values: NDArray[Any], pixels: Pixels, lights: Lights, toe: float
+    ) -> NDArray[np.float32]:
+        """Return what the model leaves over of stored values (L, N, C); see `remainder.left_over`."""
+        measured = self.measured(values)
+        position = None
+        if self._near and self._camera.mm_per_px is not None:
+            position = position_mm(pixels.row, pixels.column, *pixels.size, self._camera.mm_per_px)
+        irradiance = lights.irradiance(position)
+        return left_over(measured, self.render(pixels, lights), self.clipped(measured), irradiance, toe)
+
+
+@dataclass(frozen=True)
+class _SampledPixels:
+    """A sample of the painting, as the self-calibration takes it."""
+
+    procedure: Joint
+    sample: Sample
+
+    def fit(self, lights: Lights) -> stores.Maps:
+        return self.procedure.fit_pixels(self.sample.values, self.sample.row, self.sample.column, lights)
+
+    def radiance(self, maps: stores.Maps, lights: Lights) -> NDArray[np.float32]:
+        return self.procedure.render(self.procedure.pixels(maps, self.sample.row, self.sample.column), lights)
+
+    def measured(self) -> NDArray[np.float32]:
+        return self.procedure.measured(self.sample.values)
+
+    def clipped(self) -> NDArray[np.bool_]:
+        return self.procedure.clipped(self.measured())
+
+    def left_over(self, lights: Lights, toe: float) -> NDArray[np.float32]:
+        pixels = self.procedure.pixels(self.fit(lights), self.sample.row, self.sample.column)
+        return self.procedure.left_over(self.sample.values, pixels, lights, toe)
+
+
+def _calibration_notes(found: Calibration) -> tuple[str, ...]:
+    departure = 100 * np.abs(np.exp(np.log(found.gain / found.trend).mean(axis=1)) - 1)
+    return (
+        "self-calibration: the strengths of the lights depart from their trend over direction by "
+        f"{_rms(departure):.1f} % (rms), {departure.max():.0f} % at most; directions were turned by "
+        f"{_rms(found.turn_deg):.1f}° (rms), {found.turn_deg.max():.1f}° at most. The attribute "
+        "self_calibration lists them; --no-self-calibrate takes the lights as stated",
+    )
+
+
+def _residual_notes(found: dict[str, Any]) -> tuple[str, ...]:
+    error = found["left_out_db"]
+    return (
+        f"residual: lights left out one by one are met to {error['with_residual']:.1f} dB instead of the "
+        f"model's {error['model']:.1f} dB, with length {found['length']:.2g} and noise {found['noise']:.2g}; "
+        f"{found['components']} components keep {100 * found['kept']:.1f} % of it. Outside the hull of the "
+        "lights it fades to nothing",
+    )
+
+
+def _rms(values: NDArray[np.floating]) -> float:
+    return float(np.sqrt(np.square(values).mean()))

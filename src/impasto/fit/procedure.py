@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from impasto import store as stores
 from impasto.errors import Problem
 
+_MAX_COMPONENTS = 64
+
 
 @dataclass(frozen=True, kw_only=True)
 class FitOptions:
@@ -41,6 +43,13 @@ class FitOptions:
     highlight : str
         Whose peak that is: ``pixel``, each pixel's own brightest light, or ``sample``, that of the brightest
         pixel.
+    residual : bool
+        Whether the joint procedure describes what the model leaves over, over the light's direction.
+    residual_components : int
+        Coefficients per pixel of that description.
+    self_calibrate : bool or None
+        Whether the joint procedure finds the strength of each light from the photographs; None for where it
+        describes the residual.
     """
 
     index: float = 1.5
@@ -53,6 +62,14 @@ class FitOptions:
     refined: bool = False
     threshold_deg: float | None = 35.0
     highlight: str = "pixel"
+    residual: bool = False
+    residual_components: int = 18
+    self_calibrate: bool | None = None
+
+    @property
+    def calibrates(self) -> bool:
+        """Whether the strengths of the lights are found from the photographs."""
+        return self.residual if self.self_calibrate is None else self.self_calibrate
 
     def problems(self) -> list[Problem]:
         """Return everything that is wrong with the options, apart from names to exclude."""
@@ -76,6 +93,9 @@ class FitOptions:
             )
         if self.max_steps < 1:
             problems.append(Problem("--max-steps", f"is {self.max_steps}, expected 1 or more", "Try 60"))
+        if not 1 <= self.residual_components <= _MAX_COMPONENTS:
+            what = f"is {self.residual_components}, expected 1 to {_MAX_COMPONENTS}"
+            problems.append(Problem("--residual-components", what, "Try 9, 18 or 27"))
         if self.threshold_deg is not None and not 0.0 < self.threshold_deg < 90.0:
             problems.append(
                 Problem(

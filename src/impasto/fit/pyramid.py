@@ -64,6 +64,14 @@ def halve_status(status: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return severity[np.maximum.reduce(_corners(rank[padded]))]
 
 
+def halve_codes(codes: NDArray[np.uint16]) -> NDArray[np.uint16]:
+    """Return the mean of each 2 x 2 block of codes (H, W, K), rounded; linear in what they stand for."""
+    padded = np.pad(codes, [(0, size % 2) for size in codes.shape[:2]] + [(0, 0)], mode="edge")
+    total: NDArray[np.uint32] = np.stack(_corners(padded)).sum(axis=0, dtype=np.uint32)
+    mean: NDArray[np.uint16] = ((total + 2) // 4).astype(np.uint16)
+    return mean
+
+
 def _corners(values: NDArray[Any]) -> list[NDArray[Any]]:
     return [values[row::2, column::2] for row in (0, 1) for column in (0, 1)]
 
@@ -72,6 +80,7 @@ def halving(name: str) -> Callable[[NDArray[Any]], NDArray[Any]]:
     """Return the function that halves the map `name`."""
     special: dict[str, Callable[[NDArray[Any]], NDArray[Any]]] = {
         "normal": halve_normal,
+        "residual": halve_codes,
         "status": halve_status,
     }
     return special.get(name, halve)

@@ -334,7 +334,7 @@ class Band:
     matte_pixels: int
 
 
-def render_bands(fit: Fit, lights: Lights, camera: Camera) -> Iterator[Band]:
+def render_bands(fit: Fit, lights: Lights, camera: Camera, *, residual: bool = True) -> Iterator[Band]:
     """Render a fit under lights, in bands of rows from top to bottom.
 
     A pixel whose highlight the photographs do not identify (status 5) is rendered without one.
@@ -347,6 +347,8 @@ def render_bands(fit: Fit, lights: Lights, camera: Camera) -> Iterator[Band]:
         The lights.
     camera : Camera
         The camera of the photographs.
+    residual : bool, optional
+        Whether to add what the model leaves over, where the fit describes it.
 
     Yields
     ------
@@ -365,7 +367,7 @@ def render_bands(fit: Fit, lights: Lights, camera: Camera) -> Iterator[Band]:
     )
     for top in range(0, height, step):
         rows = slice(top, min(top + step, height))
-        pixels = read_pixels(fit, rows, slice(0, width))
+        pixels = read_pixels(fit, rows, slice(0, width), residual=residual)
         yield Band(
             rows=rows,
             radiance=render_pixels(pixels, lights, camera).reshape(

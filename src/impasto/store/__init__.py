@@ -27,6 +27,7 @@ from impasto.store.hierarchy import (
 from impasto.store.layout import (
     ASSUMED_WHITE,
     PYRAMIDS,
+    RESIDUAL,
     SCHEMA,
     STACK,
     STACK_CHUNK,
@@ -37,6 +38,7 @@ from impasto.store.layout import (
     Unit,
     fit_maps,
     level_sizes,
+    residual_map,
     unit_at,
     units,
 )
@@ -50,6 +52,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ASSUMED_WHITE",
     "PYRAMIDS",
+    "RESIDUAL",
     "SCHEMA",
     "STACK",
     "STACK_CHUNK",
@@ -89,6 +92,7 @@ __all__ = [
     "read_group",
     "read_stack",
     "remove_fit",
+    "residual_map",
     "run",
     "size_on_disk",
     "source_problems",

@@ -56,6 +56,9 @@ def stack_fill_value(dtype: np.dtype) -> float | int:
     return float("nan") if dtype.kind == "f" else int(np.iinfo(dtype).max)
 
 
+RESIDUAL = "residual"
+
+
 @dataclass(frozen=True)
 class Map:
     """One array of a fit.
@@ -92,8 +95,8 @@ class Map:
 
     @property
     def fill_value(self) -> float | int:
-        """What a pixel holds before it is fitted: NaN, or the status "not fitted"."""
-        return 255 if self.name == "status" else float("nan")
+        """What a pixel holds before it is fitted: NaN, the status "not fitted", or the code of 0."""
+        return {"status": 255, RESIDUAL: 2**15}.get(self.name, float("nan"))
 
 
 def fit_maps(shape_names: tuple[str, ...], *, lobes: int, ambient: bool, channels: int) -> tuple[Map, ...]:
@@ -135,6 +138,12 @@ def fit_maps(shape_names: tuple[str, ...], *, lobes: int, ambient: bool, channel
         Map("residual_rms", None, 1, "1", "root mean square residual in relative radiance"),
         Map("status", None, 1, "1", "how the fit of the pixel ended", dtype="uint8"),
     )
+
+
+def residual_map(components: int) -> Map:
+    """Return the map of what a model leaves over, with so many coefficients per pixel."""
+    long_name = "codes of what the model leaves over, over the light's direction"
+    return Map(RESIDUAL, "component", components, "1", long_name, dtype="uint16")
 
 
 @dataclass(frozen=True)

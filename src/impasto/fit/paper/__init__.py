@@ -25,7 +25,7 @@ from impasto.models import MODELS, ModelSpec
 
 __all__ = ["Paper"]
 
-_FOREIGN = {"loss": "joint", "loss_scale": "joint"}
+_FOREIGN = dict.fromkeys(("loss", "loss_scale", "residual", "residual_components", "self_calibrate"), "joint")
 # What the highlight's width is told by, whatever model is fitted.
 _WIDTH_MODEL = "torrance-sparrow"
 # The paper's residuals are unweighted.

@@ -1,0 +1,74 @@
+"""Some pixels of a stack, spread evenly, for what has to be known before the whole is fitted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impasto import store as stores
+from impasto.fit.streaming import read_tiles
+from impasto.progress import progress
+
+# Enough for the second moments of some hundred samples per pixel, few enough to be fitted several times over.
+_PIXELS = 12288
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Pixels on a regular grid.
+
+    Parameters
+    ----------
+    values : ndarray of shape (L, N, C), uint16 or float32
+        As stored.
+    row, column : ndarray of shape (N,), int
+        Where they lie.
+    """
+
+    values: NDArray[Any]
+    row: NDArray[np.intp]
+    column: NDArray[np.intp]
+
+
+def sample_pixels(stack: stores.Stack, lights: Sequence[int], show_progress: bool | None) -> Sample:
+    """Read pixels on a regular grid, in one pass over the stack.
+
+    Parameters
+    ----------
+    stack : Stack
+    lights : sequence of int
+        Which photographs.
+    show_progress : bool or None
+        Whether to show a progress bar; by default, if standard error is a terminal.
+
+    Raises
+    ------
+    StoreError
+        If the stack is damaged.
+    """
+    _, height, width, _ = stack.shape
+    step = max(1, math.isqrt(height * width // _PIXELS))
+    values, row, column = [], [], []
+    title = "Looking at a sample"
+    with (
+        progress(title, height * width, show=show_progress) as advance,
+        closing(read_tiles(stack, lights, stores.units(height, width))) as tiles,
+    ):
+        for _, rows, columns, radiance in tiles:
+            # The grid is the whole picture's, so that it does not depend on how tiles are cut.
+            first = [-(place.start + step // 2) % step for place in (rows, columns)]
+            part = radiance[:, first[0] :: step, first[1] :: step]
+            values.append(part.reshape(len(part), -1, part.shape[-1]).copy())
+            grid = np.mgrid[
+                rows.start + first[0] : rows.stop : step, columns.start + first[1] : columns.stop : step
+            ]
+            row.append(grid[0].ravel())
+            column.append(grid[1].ravel())
+            advance(radiance.shape[1] * radiance.shape[2])
+    return Sample(np.concatenate(values, axis=1), np.concatenate(row), np.concatenate(column))

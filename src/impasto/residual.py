@@ -1,0 +1,157 @@
+"""What a model leaves over of the photographs, as a smooth function of the light's direction per pixel.
+
+docs/store.md specifies the numbers; why they are what they are says docs/decisions/0009-residual-term.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from impasto.geometry import Array
+
+Values = NDArray[np.float32]
+
+ZERO = 32768
+"""Code of the coefficient 0: a pixel without a fit has nothing to add."""
+
+
+def encode(radiance: ArrayLike, toe: float) -> Values:
+    """Return radiance (...) on the scale in which the residual is added: f(Y) = √(max(Y, 0) + a) − √a.
+
+    Parameters
+    ----------
+    radiance : array_like
+        Relative radiance; NaN counts as 0.
+    toe : float
+        a, in relative radiance.
+    """
+    values = np.maximum(np.nan_to_num(np.asarray(radiance, np.float32)), np.float32(0.0))
+    values += np.float32(toe)
+    np.sqrt(values, out=values)
+    values -= np.float32(np.sqrt(toe))
+    return values
+
+
+def decode(values: Values, toe: float) -> Values:
+    """Return the radiance of encoded values (...), the inverse of `encode`; what is below 0 counts as 0."""
+    radiance = np.maximum(values, np.float32(0.0))
+    radiance += np.float32(np.sqrt(toe))
+    np.square(radiance, out=radiance)
+    radiance -= np.float32(toe)
+    return radiance
+
+
+def kernel(first: ArrayLike, second: ArrayLike, length: float) -> Array:
+    """Return exp(−|l − d|² / 2ℓ²) of unit vectors (N, 3) and (M, 3), as (N, M)."""
+    # For unit vectors |l − d|² = 2 − 2 l·d.
+    cosine = np.asarray(first, np.float64) @ np.asarray(second, np.float64).T
+    result: Array = np.exp((np.minimum(cosine, 1.0) - 1.0) / length**2)
+    return result
+
+
+@dataclass(frozen=True)
+class ResidualTerm:
+    """The part of a residual that all pixels share: K functions of the light's direction.
+
+    Parameters
+    ----------
+    direction : ndarray of shape (N, 3)
+        The lights that were fitted.
+    length : float
+        Length of the kernel.
+    weights : ndarray of shape (K, C, N)
+    step : ndarray of shape (K,)
+        Coefficient per step of the codes.
+    toe : float
+        Of the encoding.
+    hull : ndarray of shape (F, 3)
+        Unit vectors that point into the hull of the lights from each of its sides.
+    fade : float
+        Sine of the angle over which the term fades outside of the hull.
+    """
+
+    direction: Array
+    length: float
+    weights: Array
+    step: Array
+    toe: float
+    hull: Array
+    fade: float
+
+    @classmethod
+    def of(cls, attributes: Mapping[str, Any]) -> ResidualTerm | None:
+        """Return the term of a fit with these attributes, or None if it was fitted without."""
+        found = attributes.get("residual")
+        if not found:
+            return None
+
+        def array(name: str) -> Array:
+            return np.array(found[name], np.float64)
+
+        return cls(
+            direction=array("direction"),
+            length=float(found["length"]),
+            weights=array("weights"),
+            step=array("step"),
+            toe=float(found["toe"]),
+            hull=array("hull"),
+            fade=float(found["fade"]),
+        )
+
+    @property
+    def components(self) -> int:
+        """K, the number of functions, and of coefficients per pixel."""
+        return len(self.step)
+
+    def share(self, direction: ArrayLike) -> Array:
+        """Return how much of the term is left at directions (L, 3): 1 in the lights' hull, less beyond it."""
+        outside = (-(np.asarray(direction, np.float64) @ self.hull.T)).max(axis=1)
+        part = np.clip(outside / self.fade, 0.0, 1.0)
+        result: Array = 1.0 - part * part * (3.0 - 2.0 * part)
+        return result
+
+    def basis(self, direction: ArrayLike) -> Array:
+        """Return the functions at light directions (L, 3), with the fading, as (L, K, C)."""
+        values = np.einsum("kcn,ln->lkc", self.weights, kernel(direction, self.direction, self.length))
+        result: Array = values * self.share(direction)[:, None, None]
+        return result
+
+    def add(
+        self, radiance: Values, codes: NDArray[np.uint16], direction: ArrayLike, irradiance: Values
+    ) -> None:
+        """Add the term to the radiance of pixels, in place.
+
+        Parameters
+        ----------
+        radiance : ndarray of shape (L, P, C), float32
+            As the model gives it; NaN stays NaN.
+        codes : ndarray of shape (P, K), uint16
+        direction : ndarray of shape (L, 3)
+            Of the lights.
+        irradiance : ndarray of shape (L, P or 1, C), float32
+            Of the lights at the pixels: intensity times fall-off.
+        """
+        basis = self.basis(direction) * self.step[:, None]
+        lights, pixels, channels = radiance.shape
+        if not lights or not basis.any():
+            return
+        table = basis.transpose(1, 0, 2).reshape(self.components, -1).astype(np.float32)
+        # Blocks that stay in the processor's cache.
+        rows = max(256, 262144 // (lights * channels + self.components))
+        for first in range(0, pixels, rows):
+            part = slice(first, first + rows)
+            coefficients = codes[part].astype(np.float32)
+            coefficients -= np.float32(ZERO)
+            added = (coefficients @ table).reshape(-1, lights, channels).transpose(1, 0, 2)
+            share = irradiance if irradiance.shape[1] == 1 else irradiance[:, part]
+            dark = ~(share > 0.0)
+            values = encode(radiance[:, part] / np.where(dark, np.float32(1.0), share), self.toe)
+            values += added
+            result = decode(values, self.toe)
+            result *= share
+            np.copyto(radiance[:, part], result, where=np.isfinite(radiance[:, part]) & ~dark)

@@ -1,0 +1,146 @@
+"""The residual term: closed forms against their definitions, fading, and what a fit with it gives."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+import impasto
+from impasto.errors import OptionError
+from impasto.fit import FitOptions
+from impasto.fit.light_process import LightProcess, compress, hull_of
+from impasto.geometry import arm_direction, dome_direction
+from impasto.residual import ZERO, ResidualTerm, decode, encode, kernel
+from impasto.store import open_fit, open_stack
+
+RNG = np.random.default_rng(4)
+MODEL = "torrance-sparrow"
+
+
+def lights(count=24, zenith_deg=70):
+    zenith = np.arccos(RNG.uniform(np.cos(np.radians(zenith_deg)), 1, count))
+    return dome_direction(zenith, RNG.uniform(0, 2 * np.pi, count))
+
+
+def test_the_encoding_is_undone():
+    radiance = np.array([0.0, 1e-4, 0.3, 1.0, 80.0], np.float32)
+    np.testing.assert_allclose(decode(encode(radiance, 0.003), 0.003), radiance, rtol=1e-5, atol=1e-6)
+    assert encode([-1.0, np.nan], 0.003) == pytest.approx(0.0, abs=1e-8)
+
+
+def test_left_out_errors_are_those_of_processes_that_have_not_seen_the_light():
+    direction, samples = lights(), RNG.normal(size=(24, 50))
+    process = LightProcess(direction, 0.4, 0.1)
+    closed = process.left_out(samples @ samples.T / 50)
+    for left in range(24):
+        rest = np.delete(np.arange(24), left)
+        others = LightProcess(direction[rest], 0.4, 0.1)
+        row = kernel(direction[left : left + 1], direction[rest], 0.4)
+        predicted = row @ np.linalg.solve(others.gram(), samples[rest])
+        assert closed[left] == pytest.approx(np.square(predicted - samples[left]).mean(), rel=1e-8)
+
+
+def test_components_of_full_number_are_the_process_itself():
+    direction = lights(10)
+    samples = RNG.normal(size=(300, 10, 2)) * [1.0, 0.3]
+    flat = samples.reshape(300, -1)
+    moments = (flat.T @ flat / 300).reshape(10, 2, 10, 2)
+    process = LightProcess(direction, 0.7, 0.2)
+    hull = hull_of(direction)
+    whole = compress(process, hull, moments, 20)
+    assert whole.kept == pytest.approx(1.0)
+    new = direction[:3] + 0.05
+    new /= np.linalg.norm(new, axis=1, keepdims=True)
+    row = kernel(new, direction, 0.7)
+    exact = np.einsum("lm,mn,pnc->plc", row, np.linalg.inv(process.gram()), samples)
+    coefficients = np.einsum("klc,plc->pk", whole.encoder, samples)
+    basis = np.einsum("kcn,ln->lkc", whole.weights, row)
+    np.testing.assert_allclose(np.einsum("pk,lkc->plc", coefficients, basis), exact, atol=1e-6)
+    few = compress(process, hull, moments, 4)
+    assert 0.3 < few.kept < 1.0
+    assert len(few.encoder) == 4
+
+
+@pytest.mark.parametrize("planar", [False, True])
+def test_the_hull_holds_its_lights_and_nothing_far_from_them(planar):
+    direction = arm_direction(np.radians([-60, -20, 10, 55])) if planar else lights(30, 50)
+    hull = hull_of(direction)
+    assert (direction @ hull.T > -1e-6).all()
+    away = dome_direction(np.radians([80.0, 80.0]), np.radians([90.0, 200.0]))
+    assert (away @ hull.T).min(axis=1).max() < -0.1
+    np.testing.assert_allclose(np.linalg.norm(hull, axis=1), 1.0, atol=1e-6)
+
+
+def test_the_term_fades_to_nothing_outside_the_hull():
+    direction = lights(30, 40)
+    term = ResidualTerm(
+        direction, 0.5, RNG.normal(size=(4, 3, 30)), np.ones(4), 0.01, hull_of(direction), 0.17
+    )
+    assert term.share(direction) == pytest.approx(1.0)
+    low = dome_direction(np.radians([75.0]), [1.0])
+    assert term.share(low) == 0.0
+    radiance = np.full((1, 5, 3), 0.3, np.float32)
+    codes = np.full((5, 4), ZERO + 1, np.uint16)
+    term.add(radiance, codes, low, np.ones((1, 1, 3), np.float32))
+    assert (radiance == np.float32(0.3)).all()
+    term.add(radiance, codes, direction[:1], np.ones((1, 1, 3), np.float32))
+    assert (radiance != np.float32(0.3)).all()
+
+
+def test_added_as_docs_store_md_says():
+    direction = lights(12)
+    weights, step = RNG.normal(size=(3, 3, 12)), np.array([0.01, 0.02, 0.005])
+    term = ResidualTerm(direction, 0.4, weights, step, 0.004, hull_of(direction), 0.17)
+    codes = RNG.integers(ZERO - 9, ZERO + 9, size=(7, 3)).astype(np.uint16)
+    light = direction[:2]
+    irradiance = np.array([[[1.0, 1.2, 0.8]], [[2.0, 2.0, 2.0]]], np.float32)
+    model = RNG.uniform(0.0, 1.0, size=(2, 7, 3)).astype(np.float32)
+    model[0, 3] = np.nan
+    got = model.copy()
+    term.add(got, codes, light, irradiance)
+    for place in np.ndindex(2, 7, 3):
+        which, pixel, channel = place
+        near = np.exp(-np.square(light[which] - direction).sum(axis=1) / (2 * 0.4**2))
+        value = np.sqrt(model[place] / irradiance[which, 0, channel] + 0.004) - np.sqrt(0.004)
+        value += ((codes[pixel].astype(float) - ZERO) * step) @ (weights[:, channel] @ near)
+        expected = ((max(value, 0) + np.sqrt(0.004)) ** 2 - 0.004) * irradiance[which, 0, channel]
+        np.testing.assert_allclose(got[place], expected, rtol=2e-4, atol=1e-5)
+
+
+def fitted(painting, tmp_path, **options):
+    store = tmp_path / "p.zarr"
+    shutil.copytree(painting, store)
+    shutil.rmtree(store / "fits")
+    shutil.rmtree(store / "pyramids", ignore_errors=True)
+    impasto.fit(store, models=[MODEL], options=FitOptions(**options))
+    return store
+
+
+def test_a_fit_with_it_renders_closer_and_keeps_the_maps(painting, tmp_path):
+    store = fitted(painting, tmp_path, residual=True, residual_components=6, self_calibrate=False)
+    fit, stack = open_fit(store, MODEL), open_stack(store)
+    height, width = fit.shape
+    rows, columns = slice(0, height), slice(0, width)
+    plain = open_fit(painting, MODEL).read(rows, columns, ["normal", "diffuse"])
+    maps = fit.read(rows, columns)
+    np.testing.assert_array_equal(maps["normal"], plain["normal"])
+    assert maps["residual"].dtype == np.uint16
+    from impasto.render import render_bands
+
+    photographs = stack.radiance(rows, columns)
+    errors = []
+    for residual in (False, True):
+        (band,) = render_bands(fit, stack.lights, stack.camera, residual=residual)
+        difference = encode(band.radiance, 0.01) - encode(photographs, 0.01)
+        errors.append(np.nanmean(np.square(difference[photographs < stack.clip_level])))
+    assert errors[1] < 0.8 * errors[0]
+
+
+def test_the_papers_procedure_has_none(painting):
+    with pytest.raises(OptionError, match="residual"):
+        impasto.fit(painting, models=[MODEL], procedure="paper", options=FitOptions(residual=True))
+
+
+def test_a_number_of_components_is_checked(painting):
+    with pytest.raises(OptionError, match="expected 1 to"):
+        impasto.fit(painting, models=[MODEL], options=FitOptions(residual_components=0))
