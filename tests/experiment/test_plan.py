@@ -25,7 +25,7 @@ def of_kind(trials, kind):
 @pytest.mark.parametrize("pairs", [MODELS, GROUPS], ids=["models", "groups"])
 def test_each_pair_is_tested_once(pairs):
     trials = plan_session(pairs, CATCHES, seed=1, number=4, **EVERYTHING)
-    assert Counter(trial.pair for trial in of_kind(trials, "trial")) == Counter(pairs)
+    assert Counter(trial.pair for trial in of_kind(trials, "test")) == Counter(pairs)
     assert [trial.kind for trial in trials[:4]].count("practice") == 3
     assert len(of_kind(trials, "catch")) == (len(pairs) + 6) // 20
     assert len(of_kind(trials, "repeat")) == 6
@@ -33,7 +33,7 @@ def test_each_pair_is_tested_once(pairs):
 
 @pytest.mark.parametrize("pairs", [MODELS, GROUPS], ids=["models", "groups"])
 def test_sides_are_even_for_each_two_conditions(pairs):
-    tests = of_kind(plan_session(pairs, (), seed=3, number=0), "trial")
+    tests = of_kind(plan_session(pairs, (), seed=3, number=0), "test")
     left = Counter((trial.pair.condition_a, trial.pair.condition_b) for trial in tests if trial.a_left)
     for conditions, count in Counter((pair.condition_a, pair.condition_b) for pair in pairs).items():
         assert left[conditions] in {count // 2, (count + 1) // 2}
@@ -42,7 +42,7 @@ def test_sides_are_even_for_each_two_conditions(pairs):
 
 @pytest.mark.parametrize("pairs", [MODELS, GROUPS], ids=["models", "groups"])
 def test_the_second_of_two_sessions_is_the_first_reversed_with_sides_exchanged(pairs):
-    first, second = (of_kind(plan_session(pairs, (), seed=5, number=n), "trial") for n in (6, 7))
+    first, second = (of_kind(plan_session(pairs, (), seed=5, number=n), "test") for n in (6, 7))
     assert second == [replace(trial, a_left=not trial.a_left) for trial in reversed(first)]
 
 
@@ -68,8 +68,8 @@ def test_a_single_reference_is_no_obstacle():
 def test_repeats_come_later_with_the_sides_exchanged():
     for number in range(20):
         trials = plan_session(MODELS, CATCHES, seed=1, number=number, **EVERYTHING)
-        place = {trial.pair: index for index, trial in enumerate(trials) if trial.kind == "trial"}
-        side = {trial.pair: trial.a_left for trial in of_kind(trials, "trial")}
+        place = {trial.pair: index for index, trial in enumerate(trials) if trial.kind == "test"}
+        side = {trial.pair: trial.a_left for trial in of_kind(trials, "test")}
         for index, trial in enumerate(trials):
             if trial.kind == "repeat":
                 assert index - place[trial.pair] > 10
@@ -86,4 +86,4 @@ def test_catches_are_spread_and_stand_on_both_sides():
 
 def test_more_is_asked_than_there_is():
     trials = plan_session(MODELS[:2], CATCHES, seed=1, number=0, repeats=9, catch_every=20, practice=9)
-    assert Counter(trial.kind for trial in trials) == {"practice": 2, "trial": 2, "repeat": 2, "catch": 1}
+    assert Counter(trial.kind for trial in trials) == {"practice": 2, "test": 2, "repeat": 2, "catch": 1}

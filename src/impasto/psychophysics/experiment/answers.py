@@ -195,7 +195,7 @@ def session_states(engine: Engine) -> list[SessionState]:
         count = counted[row.id]
         given = answered.get(row.id, [])
         catches = [trial.choice == "A" for trial in given if trial.kind == "catch"]
-        first = {_pair(trial): trial.choice for trial in given if trial.kind == "trial"}
+        first = {_pair(trial): trial.choice for trial in given if trial.kind == "test"}
         repeats = [trial.choice == first.get(_pair(trial)) for trial in given if trial.kind == "repeat"]
         states.append(
             SessionState(

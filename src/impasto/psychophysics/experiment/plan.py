@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-Kind = Literal["practice", "trial", "repeat", "catch"]
+Kind = Literal["practice", "test", "repeat", "catch"]
 
 _REPEAT_DISTANCE = 10
 """Trials between a pair and its repetition, where the session is long enough."""
@@ -97,7 +97,7 @@ def plan_session(
     first_of_two = np.random.default_rng((seed, number // 2))
     own = np.random.default_rng((seed, number // 2, number % 2))
     trials = [
-        PlannedTrial("trial", pair, bool(side))
+        PlannedTrial("test", pair, bool(side))
         for pair, side in zip(pairs, _balanced_sides(pairs, first_of_two), strict=True)
     ]
     trials = _apart([trials[index] for index in first_of_two.permutation(len(trials))], first_of_two)
