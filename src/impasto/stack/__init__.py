@@ -20,6 +20,7 @@ from impasto.errors import CaptureError, Problem, StoreError, raise_problems
 from impasto.progress import progress
 from impasto.stack.light_colour import light_colour
 from impasto.stack.linearise import Linearisation, linearisations
+from impasto.stack.samples import Samples
 
 # Noise in relative radiance where the capture does not state it, by the type of the photographs: an 8-bit
 # encoding rounds to half a per cent of the radiance and to 0.001 near black; see docs/store.md.
@@ -221,6 +222,7 @@ class _Job:
         self._linearisations = linearisations(capture.photographs, capture.clip_level)
         self.header = _header(capture, self._linearisations)
         self.decoders = _decoders(capture.photographs, self._linearisations[0], memory_bytes)
+        self._samples = Samples(self.header.shape, self.header.dtype)
         self._stop = threading.Event()
 
     def difference(self, found: dict[str, Any]) -> str:
@@ -269,7 +271,7 @@ class _Job:
     def _light_colour(self, writer: stores.StackWriter) -> dict[str, Any]:
         """Return what the highlights of the photographs, all written, tell about the light."""
         written = stores.read_group(writer.store / stores.STACK) or {}
-        colour = light_colour(stores.Stack(writer.store, written))
+        colour = light_colour(stores.Stack(writer.store, written), self._samples)
         notes = [*self.capture.notes, *([colour.note] if colour.note else [])]
         return {"light_rgb": list(colour.rgb), "light_rgb_source": colour.source, "notes": notes}
 
@@ -323,7 +325,9 @@ class _Job:
         for row, band in photograph.bands(stores.STACK_CHUNK):
             self._check_stop()
             clipped += linearise.clipped_samples(band)
-            writer.write_band(light, row, linearise(band))
+            stored = linearise(band)
+            self._samples.take(light, row, stored)
+            writer.write_band(light, row, stored)
             advance(len(band))
         writer.finish_light(light, sha256, clipped)
         return False

@@ -9,14 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto import store as stores
-from impasto.geometry import pixel_position_mm
 from impasto.stack.highlights import Array, Highlights, separate
-
-# Pixels looked at, in a lattice on chunks spread over the painting; fewer where lights are many.
-_PIXELS = 8192
-_SAMPLES = 1 << 20
-_CHUNKS_ACROSS = 3
-_LIGHTS_AT_ONCE = 8
+from impasto.stack.samples import Samples
 
 # Pixels whose diffuse colours differ by less than this (natural logarithm) count as one paint.
 _PAINT_WIDTH = 0.15
@@ -66,12 +60,14 @@ class LightColour:
     note: str
 
 
-def light_colour(stack: stores.Stack) -> LightColour:
+def light_colour(stack: stores.Stack, samples: Samples | None = None) -> LightColour:
     """Estimate the colour of the light from the highlights of a stack.
 
     Parameters
     ----------
     stack : Stack
+    samples : Samples, optional
+        What was taken of the photographs on their way into the stack; what is missing is read from it.
 
     Returns
     -------
@@ -95,7 +91,9 @@ def light_colour(stack: stores.Stack) -> LightColour:
     channels = stack.shape[3]
     if channels != 3:
         return LightColour((1.0,) * channels, stores.ASSUMED_WHITE, "")
-    return from_highlights(_highlights(stack))
+    samples = samples or Samples(stack.shape, stack.dtype)
+    samples.complete(stack)
+    return from_highlights(_highlights(stack, samples))
 
 
 def from_highlights(highlights: Highlights) -> LightColour:
@@ -131,53 +129,21 @@ def _white(reason: str) -> LightColour:
     return LightColour((1.0, 1.0, 1.0), stores.ASSUMED_WHITE, note)
 
 
-def _highlights(stack: stores.Stack) -> Highlights:
+def _highlights(stack: stores.Stack, samples: Samples) -> Highlights:
     """Separate the highlights of pixels all over the painting."""
-    lights, height, width, channels = stack.shape
-    chunks = [(rows, columns) for rows in _spread(height) for columns in _spread(width)]
-    pixels = sum((rows.stop - rows.start) * (columns.stop - columns.start) for rows, columns in chunks)
-    wanted = min(_PIXELS, max(_PIXELS // 8, _SAMPLES // lights))
-    step = math.ceil(math.sqrt(pixels / wanted))
-    lattice = slice(step // 2, None, step)
-    radiance = np.concatenate([_read(stack, *chunk, lattice) for chunk in chunks])
-    light = _light_vectors(stack, chunks, lattice)
-    usable = (np.isfinite(radiance) & (radiance < stack.clip_level)).all(axis=-1)
-    radiance /= np.broadcast_to(stack.lights.intensity, (lights, channels))
-    return separate(radiance, usable, light, stack.noise[0])
+    radiance = samples.radiance(stack)
+    usable = np.isfinite(radiance) & (radiance < stack.clip_level)
+    radiance /= np.broadcast_to(stack.lights.intensity, radiance.shape[1:])
+    return separate(radiance, np.all(usable, axis=-1), _light_vectors(stack, samples), stack.noise[0])
 
 
-def _spread(length: int) -> list[slice]:
-    """Return rows, or columns, of up to three chunks, spread evenly over the painting."""
-    size = stores.STACK_CHUNK
-    count = -(-length // size)
-    chosen = sorted({round(chunk) for chunk in np.linspace(0, count - 1, min(count, _CHUNKS_ACROSS))})
-    return [slice(chunk * size, min((chunk + 1) * size, length)) for chunk in chosen]
-
-
-def _read(stack: stores.Stack, rows: slice, columns: slice, lattice: slice) -> Array:
-    """Return relative radiance on a lattice in a chunk, shape (N, L, C), a few lights at a time."""
-    lights, _, _, channels = stack.shape
-    parts = [
-        stack.read(rows, columns, range(first, min(first + _LIGHTS_AT_ONCE, lights)))[:, lattice, lattice]
-        for first in range(0, lights, _LIGHTS_AT_ONCE)
-    ]
-    values = np.concatenate(parts).reshape(lights, -1, channels).swapaxes(0, 1)
-    return values * np.float64(stack.scale) + stack.offset
-
-
-def _light_vectors(stack: stores.Stack, chunks: list[tuple[slice, slice]], lattice: slice) -> Array:
+def _light_vectors(stack: stores.Stack, samples: Samples) -> Array:
     """Return direction times relative irradiance of each light, shape (N or 1, L, 3)."""
     lights, mm_per_px = stack.lights, stack.camera.mm_per_px
     direction = lights.direction[np.newaxis]
     if not lights.near or mm_per_px is None:
         return direction
-    _, height, width, _ = stack.shape
-    parts = []
-    for rows, columns in chunks:
-        position = pixel_position_mm(rows, columns, height, width, mm_per_px)
-        grid = position.reshape(rows.stop - rows.start, columns.stop - columns.start, 2)
-        parts.append(grid[lattice, lattice].reshape(-1, 2))
-    on_painting = np.pad(np.concatenate(parts), ((0, 0), (0, 1)))
+    on_painting = np.pad(samples.position_mm(mm_per_px), ((0, 0), (0, 1)))
     away = lights.position_mm - on_painting[:, np.newaxis]
     distance = np.linalg.norm(away, axis=-1, keepdims=True)
     at_centre = np.linalg.norm(lights.position_mm, axis=-1)[:, np.newaxis]
