@@ -7,7 +7,7 @@ value only. Zarr's version 3 and its codec ``zstd`` say what a chunk is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import product
 from typing import Any
 
@@ -18,7 +18,7 @@ from impasto.store.layout import ZSTD
 
 
 def encode_chunks(
-    values: NDArray[Any], size: int, fill_value: float
+    values: NDArray[Any], size: int, fill_value: float, zstd: Mapping[str, Any] = ZSTD
 ) -> Iterator[tuple[tuple[int, int], bytes]]:
     """Cut pixels into chunks of `size` x `size` and yield each, by its row and column, as it lies on disk.
 
@@ -28,10 +28,12 @@ def encode_chunks(
         Where it ends inside of a chunk, the chunk is filled up with `fill_value`.
     size : int
     fill_value : float
+    zstd : mapping, optional
+        Options of the compressor.
     """
     from numcodecs.zstd import Zstd
 
-    compressor = Zstd(**ZSTD)
+    compressor = Zstd(**zstd)
     dtype = values.dtype.newbyteorder("<")
     for row, column in product(*(range(-(-length // size)) for length in values.shape[:2])):
         part = values[row * size : (row + 1) * size, column * size : (column + 1) * size]

@@ -150,9 +150,13 @@ def remove(store: Path, *paths: str) -> None:
 
 
 def create_stack_array(
-    store: Path, shape: tuple[int, int, int, int], dtype: np.dtype, attributes: Attributes
+    store: Path,
+    shape: tuple[int, int, int, int],
+    dtype: np.dtype,
+    attributes: Attributes,
+    zstd: Mapping[str, Any],
 ) -> None:
-    """Create ``stack/radiance`` for `shape` (light, y, x, channel), uint16 or float32."""
+    """Create ``stack/radiance`` for `shape` (light, y, x, channel), compressed by `zstd`."""
     _create(
         store,
         f"{STACK}/radiance",
@@ -162,6 +166,7 @@ def create_stack_array(
         chunks=(1, STACK_CHUNK, STACK_CHUNK, shape[3]),
         fill_value=stack_fill_value(dtype),
         attributes=attributes,
+        zstd=zstd,
     )
 
 
@@ -203,13 +208,13 @@ def create_renderings_array(store: Path, path: str, shape: tuple[int, int, int, 
     )
 
 
-def _create(store: Path, path: str, **arguments: Any) -> zarr.Array[Any]:
+def _create(store: Path, path: str, *, zstd: Mapping[str, Any] = ZSTD, **arguments: Any) -> zarr.Array[Any]:
     import zarr
     from zarr.codecs import ZstdCodec
 
     with writing(store, path), _pipeline():
         return zarr.create_array(
-            store, name=path, zarr_format=3, overwrite=True, compressors=[ZstdCodec(**ZSTD)], **arguments
+            store, name=path, zarr_format=3, overwrite=True, compressors=[ZstdCodec(**zstd)], **arguments
         )
 
 

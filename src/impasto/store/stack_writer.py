@@ -25,7 +25,17 @@ from impasto.store.hierarchy import (
     write_group,
     write_table,
 )
-from impasto.store.layout import EVALUATIONS, FITS, PYRAMIDS, SCHEMA, STACK, STACK_CHUNK, stack_fill_value
+from impasto.store.layout import (
+    EVALUATIONS,
+    FITS,
+    PYRAMIDS,
+    SCHEMA,
+    STACK,
+    STACK_CHUNK,
+    ZSTD,
+    ZSTD_NOISE,
+    stack_fill_value,
+)
 
 _TABLES: dict[str, tuple[tuple[str, ...], Attributes]] = {
     "light_name": (("light",), {"long_name": "name of the photograph"}),
@@ -142,6 +152,7 @@ class StackWriter:
     def __init__(self, store: Path, header: StackHeader, *, fresh: bool) -> None:
         self.store = store
         self._header = header
+        self._zstd = ZSTD if header.inputs[0].get("dtype") == "uint8" else ZSTD_NOISE
         self._writing = threading.Lock()
         self._attributes = self._begin({**provenance(), **header.attributes()}, fresh)
 
@@ -159,6 +170,7 @@ class StackWriter:
             self._header.shape,
             self._header.dtype,
             {"long_name": "relative radiance, as scale * value + offset", "units": "1"},
+            self._zstd,
         )
         for name, values in self._header.tables().items():
             dims, attributes = _TABLES[name]
@@ -199,7 +211,7 @@ class StackWriter:
         folder = self.store / STACK / "radiance" / "c" / str(light)
         fill_value = stack_fill_value(band.dtype)
         with writing(self.store, f"{STACK}/radiance"):
-            for (_, column), chunk in encode_chunks(band, STACK_CHUNK, fill_value):
+            for (_, column), chunk in encode_chunks(band, STACK_CHUNK, fill_value, self._zstd):
                 write_whole(folder / str(row // STACK_CHUNK) / str(column) / "0", chunk)
 
     def finish_light(self, light: int, sha256: str, clipped_samples: int) -> None:
