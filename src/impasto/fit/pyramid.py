@@ -166,9 +166,13 @@ class Pyramid:
                 (rows.stop - rows.start) * (columns.stop - columns.start),
             )
         row, column = unit.rows.start // 2 - parent.rows.start, unit.columns.start // 2 - parent.columns.start
-        for name, values in maps.items():
-            half = halving(name)(values)
+
+        def halve_map(name: str) -> None:
+            half = halving(name)(maps[name])
             partial.maps[name][row : row + half.shape[0], column : column + half.shape[1]] = half
+
+        with ThreadPoolExecutor(_THREADS, thread_name_prefix="pyramid") as pool:
+            list(pool.map(halve_map, maps))
         partial.pixels_missing -= unit.pixels
         if partial.pixels_missing == 0:
             del self._partial[number]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
     import zarr
 
 Maps = dict[str, NDArray[Any]]
+
+# Maps of a unit that are encoded and written at a time.
+_WRITERS = 2
 
 
 class MapsWriter:
@@ -115,8 +119,10 @@ class MapsWriter:
             If the disk is full or refuses.
         """
         self.begin(unit)
-        for map in self.maps:
-            self.write_map(unit, map, values[map.name])
+        *others, status = self.maps
+        with ThreadPoolExecutor(_WRITERS, thread_name_prefix="map") as pool:
+            list(pool.map(lambda map: self.write_map(unit, map, values[map.name]), others))
+        self.write_map(unit, status, values[status.name])
 
     def begin(self, unit: Unit) -> None:
         """Forget what there is of a unit, so that it does not count as whole while it is written anew."""
