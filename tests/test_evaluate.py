@@ -79,8 +79,8 @@ def test_held_out_photographs_do_not_enter_the_fit(capture, painting, tmp_path, 
     rendered = []
     original = MODULE.render_bands
 
-    def spy(*arguments):
-        for band in original(*arguments):
+    def spy(*arguments, **options):
+        for band in original(*arguments, **options):
             rendered.append(band.radiance)
             yield band
 

@@ -28,13 +28,21 @@ def evaluate(
         list[str] | None,
         typer.Option("--model", metavar="NAME", help="May be repeated; those in the store by default."),
     ] = None,
+    baselines: Annotated[
+        bool,
+        typer.Option("--baselines/--no-baselines", help="Judge PTM, HSH and other relighting methods too."),
+    ] = True,
     json: Json = None,
     debug: Debug = False,
 ) -> None:
     """Compare renderings with photographs that the fit has not seen."""
     with reporting("evaluate", json, debug) as report:
         summary = impasto.evaluate(
-            store, models=model or (), held_out=held_out, held_out_lights=held_out_lights
+            store,
+            models=model or (),
+            held_out=held_out,
+            held_out_lights=held_out_lights,
+            baselines=baselines,
         )
         report.say(f"{len(summary.held_out)} photographs held out, {summary.fitted} fitted")
         for heading, header, rows in evaluate_tables(summary):

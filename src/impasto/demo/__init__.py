@@ -86,7 +86,9 @@ def demo(
         for line in fit_lines(fitted):
             say(line)
     with clock.step("evaluate", f"evaluate {store} --held-out-lights {listed}"):
-        evaluated = evaluate(store, models=MODELS, held_out_lights=held.names, show_progress=show_progress)
+        evaluated = evaluate(
+            store, models=MODELS, held_out_lights=held.names, baselines=False, show_progress=show_progress
+        )
         for heading, header, rows in evaluate_tables(evaluated):
             say(f"{heading}: " + ", ".join(f"{header[k]} {rows[-1][k]}" for k in (2, 3, 4)))
     # A photograph's own light has the photograph's exposure; pictures are brightened by as much.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from impasto.colour import encode_srgb
 from impasto.errors import OptionError, Problem, StoreError
-from impasto.evaluate.errors import ErrorAccumulator, ImageErrors
+from impasto.evaluate.baselines import BaselineErrors, baseline_errors
+from impasto.evaluate.errors import ErrorAccumulator, ImageErrors, mean_errors
 from impasto.evaluate.held_out import listed_lights, named_lights, spread_lights
 from impasto.fit import FitOptions, fit
 from impasto.geometry import Lights, zenith_azimuth
@@ -33,7 +34,7 @@ from impasto.store import (
 )
 from impasto.store.borrow import borrowed_stack
 
-__all__ = ["EvaluateSummary", "ImageErrors", "LightErrors", "ModelErrors", "evaluate"]
+__all__ = ["BaselineErrors", "EvaluateSummary", "ImageErrors", "LightErrors", "ModelErrors", "evaluate"]
 
 _DEFAULT_MODELS = ("torrance-sparrow", "phong")
 _DEFAULT_HELD_OUT = 5
@@ -78,6 +79,8 @@ class ModelErrors:
         One entry per held-out photograph.
     mean : ImageErrors
         The mean over them.
+    without_residual : ImageErrors or None
+        The mean of the model alone, where the fit describes what it leaves over too.
     """
 
     model: str
@@ -85,6 +88,7 @@ class ModelErrors:
     refitted: bool
     lights: tuple[LightErrors, ...]
     mean: ImageErrors
+    without_residual: ImageErrors | None = None
 
 
 @dataclass(frozen=True)
@@ -101,6 +105,8 @@ class EvaluateSummary:
         Photographs that the fits have seen.
     models : tuple of ModelErrors
         One entry per model.
+    baselines : tuple of BaselineErrors
+        One entry per relighting method without a model, fitted to the same photographs.
     not_recorded : str
         Why the store could not keep the result for `report`; empty where it could.
     seconds : float
@@ -110,6 +116,7 @@ class EvaluateSummary:
     held_out: tuple[str, ...]
     fitted: int
     models: tuple[ModelErrors, ...]
+    baselines: tuple[BaselineErrors, ...]
     not_recorded: str
     seconds: float
 
@@ -120,6 +127,7 @@ def evaluate(
     models: Sequence[str] = (),
     held_out: int | None = None,
     held_out_lights: str | PathLike[str] | Sequence[str] | None = None,
+    baselines: bool = True,
     show_progress: bool | None = None,
 ) -> EvaluateSummary:
     """Render photographs that were kept out of the fit, and compare.
@@ -139,6 +147,8 @@ def evaluate(
         How many photographs to hold out, spread in elevation; 5 by default, fewer where there are few.
     held_out_lights : path or sequence of str, optional
         Which photographs to hold out instead: a file that names them, or their names.
+    baselines : bool, optional
+        Whether to judge the relighting methods in use too, fitted to the same photographs.
     show_progress : bool, optional
         Whether to show progress bars; by default, if standard error is a terminal.
 
@@ -180,23 +190,30 @@ def evaluate(
                 )
             fitted = open_fit(source, spec.name)
             errors, kept = _compare(fitted, stack, held, show_progress)
+            alone = None
+            if "residual" in fitted.attributes:
+                without, _ = _compare(fitted, stack, held, show_progress, residual=False)
+                alone = mean_errors([entry.errors for entry in without])
             result = ModelErrors(
                 model=spec.name,
                 procedure=str(fitted.attributes["procedure"]),
                 refitted=not unseen,
                 lights=errors,
-                mean=_mean([entry.errors for entry in errors]),
+                mean=mean_errors([entry.errors for entry in errors]),
+                without_residual=alone,
             )
             results.append(result)
             try:
                 write_evaluation(path, spec.name, _record(result, fitted, stack, kept), kept)
             except StoreError as error:  # a store that may only be read can be judged all the same
                 not_recorded = str(error)
+    seen = [number for number in range(len(stack.lights)) if number not in held]
     return EvaluateSummary(
         store=path,
         held_out=names,
         fitted=len(stack.lights) - len(held),
         models=tuple(results),
+        baselines=baseline_errors(stack, seen, held, show_progress) if baselines else (),
         not_recorded=not_recorded,
         seconds=time.perf_counter() - started,
     )
@@ -230,7 +247,7 @@ def _settings(store: Path, model: str) -> tuple[str | None, FitOptions]:
 
 
 def _compare(
-    fitted: Fit, stack: Stack, held: Sequence[int], show_progress: bool | None
+    fitted: Fit, stack: Stack, held: Sequence[int], show_progress: bool | None, *, residual: bool = True
 ) -> tuple[tuple[LightErrors, ...], NDArray[np.float32]]:
     """Compare renderings of the held-out lights with their photographs; return these, thinned out, too."""
     lights = stack.lights.select(np.asarray(held))
@@ -239,7 +256,7 @@ def _compare(
     step = _step(stack)
     kept = np.empty((len(held), -(-height // step), -(-width // step), channels), np.float32)
     with progress(f"Comparing {fitted.attributes['model']}", height, show=show_progress) as advance:
-        for band in render_bands(fitted, lights, stack.camera):
+        for band in render_bands(fitted, lights, stack.camera, residual=residual):
             photographs = stack.radiance(band.rows, slice(0, width), held)
             for photograph, rendering, sums in zip(photographs, band.radiance, gathered, strict=True):
                 sums.add(
@@ -276,12 +293,3 @@ def _record(result: ModelErrors, fitted: Fit, stack: Stack, kept: NDArray[np.flo
         "stack_sha256": stack.sha256,
         "px_per_px": _step(stack),
     }
-
-
-def _mean(errors: Sequence[ImageErrors]) -> ImageErrors:
-    return ImageErrors(
-        **{
-            field.name: float(np.mean([getattr(entry, field.name) for entry in errors]))
-            for field in fields(ImageErrors)
-        }
-    )

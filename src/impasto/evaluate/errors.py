@@ -6,7 +6,9 @@ in memory; the result is the one that the whole images would give.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,9 @@ WINDOW = 7
 """Side in pixels of the square over which SSIM compares; scikit-image's default."""
 
 _MARGIN = WINDOW // 2
+
+# Colour differences cost far more than the rest, and their mean needs no more pixels.
+_COLOUR_PIXELS = 40_000
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,8 @@ class ImageErrors:
         predicted by the fit.
     predicted : float
         Share of the pixels for which the fit gives a prediction.
+    ciede2000 : float
+        Mean colour difference ΔE00 [Sharma2005]_ of the sRGB images, over pixels on a regular grid.
     """
 
     psnr_db: float
@@ -41,6 +48,17 @@ class ImageErrors:
     rms_relative: float
     compared: float
     predicted: float
+    ciede2000: float = float("nan")
+
+
+def mean_errors(errors: Sequence[ImageErrors]) -> ImageErrors:
+    """Return the mean of each of the errors, at least one, over images."""
+    return ImageErrors(
+        **{
+            field.name: float(np.mean([getattr(entry, field.name) for entry in errors]))
+            for field in fields(ImageErrors)
+        }
+    )
 
 
 class ErrorAccumulator:
@@ -64,6 +82,8 @@ class ErrorAccumulator:
 
     def __init__(self, height: int, width: int, channels: int) -> None:
         self._shape = (height, width, channels)
+        self._colour_step = max(1, math.isqrt(height * width // _COLOUR_PIXELS))
+        self._colour_sum, self._colour_count = 0.0, 0
         self._row = 0
         self._squares_srgb = 0.0
         self._squares = 0.0
@@ -104,7 +124,19 @@ class ErrorAccumulator:
         first, second = np.nan_to_num(photograph_srgb), np.nan_to_num(rendering_srgb)
         self._squares_srgb += float(np.square(first.astype(np.float64) - second).sum())
         self._add_ssim(first, second)
+        self._add_colour(first, second)
         self._row += rows
+
+    def _add_colour(self, first: NDArray[np.float32], second: NDArray[np.float32]) -> None:
+        from skimage.color import deltaE_ciede2000, rgb2lab
+
+        step = self._colour_step
+        grid = (slice(-self._row % step, None, step), slice(None, None, step))
+        images = [np.broadcast_to(image[grid], (*image[grid].shape[:2], 3)) for image in (first, second)]
+        if images[0].size:
+            difference = deltaE_ciede2000(*(rgb2lab(image) for image in images))
+            self._colour_sum += float(difference.sum())
+            self._colour_count += difference.size
 
     def _add_ssim(self, first: NDArray[np.float32], second: NDArray[np.float32]) -> None:
         """Sum SSIM over the windows that this band completes, keeping the rows that the next one needs."""
@@ -147,4 +179,5 @@ class ErrorAccumulator:
             rms_relative=float(rms / mean) if mean > 0 else float("nan"),
             compared=self._compared / samples,
             predicted=self._predicted / (height * width),
+            ciede2000=self._colour_sum / self._colour_count if self._colour_count else float("nan"),
         )

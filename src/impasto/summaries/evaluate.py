@@ -8,24 +8,43 @@ from typing import TYPE_CHECKING
 from impasto.summaries.words import Row
 
 if TYPE_CHECKING:
-    from impasto.evaluate import EvaluateSummary
+    from impasto.evaluate import EvaluateSummary, ImageErrors
+
+_ERRORS = ("PSNR dB", "SSIM", "RMS / mean", "ΔE00")
 
 
 def evaluate_tables(summary: EvaluateSummary) -> Iterator[tuple[str, Row, list[Row]]]:
-    """Yield for each model a heading, the columns' names, and a row per held-out light and for the mean."""
-    header = ("held-out light", "zenith", "PSNR dB", "SSIM", "RMS / mean")
+    """Yield a heading, the columns' names and the rows for each model, by light, and for the baselines."""
+    header = ("held-out light", "zenith", *_ERRORS)
     for model in summary.models:
         rows: list[Row] = [
             (
                 entry.name,
                 f"{entry.zenith_deg:.1f}°",
-                f"{entry.errors.psnr_db:.2f}",
-                f"{entry.errors.ssim:.4f}",
-                f"{entry.errors.rms_relative:#.4g}",
+                *_errors(entry.errors),
             )
             for entry in model.lights
         ]
-        mean = model.mean
-        rows.append(("mean", "", f"{mean.psnr_db:.2f}", f"{mean.ssim:.4f}", f"{mean.rms_relative:#.4g}"))
+        rows.append(("mean", "", *_errors(model.mean)))
+        if model.without_residual is not None:
+            rows.append(("mean, model alone", "", *_errors(model.without_residual)))
         how = "fitted again without them" if model.refitted else "the fit in the store has not seen them"
         yield f"{model.model} ({model.procedure}; {how})", header, rows
+    if summary.baselines:
+        yield (
+            "Methods without a model, fitted to the same photographs (mean)",
+            ("method", "coefficients", *_ERRORS),
+            [
+                (f"{found.method}, in {found.scale} values", str(found.coefficients), *_errors(found.mean))
+                for found in summary.baselines
+            ],
+        )
+
+
+def _errors(errors: ImageErrors) -> Row:
+    return (
+        f"{errors.psnr_db:.2f}",
+        f"{errors.ssim:.4f}",
+        f"{errors.rms_relative:#.4g}",
+        f"{errors.ciede2000:.2f}",
+    )
