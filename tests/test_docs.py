@@ -62,6 +62,7 @@ def test_commands_stand_in_the_order_of_the_pipeline():
         "report",
         "view",
         "publish",
+        "reproduce",
         "models",
         "demo",
     ]

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from impasto.publish import publish
     from impasto.render import render
     from impasto.report import report
+    from impasto.reproduce import reproduce
     from impasto.stack import stack
     from impasto.store import open
     from impasto.view import view
@@ -52,6 +53,7 @@ __all__ = [
     "publish",
     "render",
     "report",
+    "reproduce",
     "simulate",
     "stack",
     "view",
@@ -77,6 +79,7 @@ _HOME = {
     "publish": "publish",
     "render": "render",
     "report": "report",
+    "reproduce": "reproduce",
     "simulate": "capture.simulate",
     "stack": "stack",
     "view": "view",

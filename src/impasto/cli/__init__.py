@@ -24,6 +24,7 @@ COMMANDS = (
     "report",
     "view",
     "publish",
+    "reproduce",
     "models",
     "demo",
 )

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # Okabe and Ito's palette [OkabeIto2008]_, and a marker of its own for each model.
-_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-_MARKERS = "osD^vP"
+MODEL_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+MODEL_MARKERS = "osD^vP"
 _INK = "#22201c"
 _PEAK, _SHOULDER = "#e8e4da", "#f4f1ea"
 # A highlight this much higher than the middle of the curve is shown on a logarithmic axis.
@@ -69,8 +69,10 @@ def draw_curve(path: Path, curve: Curve, fits: Mapping[str, Fit]) -> None:
         )
     style = "-" if on_arm else "none"
     for index, (name, model) in enumerate(curve.models.items()):
-        look = {"color": _COLOURS[index % len(_COLOURS)]}
-        marker = {} if on_arm else {"marker": _MARKERS[index % len(_MARKERS)], "markerfacecolor": "none"}
+        look = {"color": MODEL_COLOURS[index % len(MODEL_COLOURS)]}
+        marker = (
+            {} if on_arm else {"marker": MODEL_MARKERS[index % len(MODEL_MARKERS)], "markerfacecolor": "none"}
+        )
         diffuse, specular = luminance(model.diffuse)[order], luminance(model.specular)[order]
         upper.plot(angle, diffuse + specular, linestyle=style, **look, **marker, linewidth=1.6, label=name)
         if on_arm:

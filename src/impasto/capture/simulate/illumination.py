@@ -94,23 +94,20 @@ class Scene:
         material = surface.material[rows].ravel()
         cosine = diffuse_term(normal, light_direction, view_direction)
         out = surface.diffuse[rows].reshape(-1, 3) * cosine[:, None]
+        sources = disc_directions(light_direction, float(np.nan_to_num(lights.angular_size_deg[light])))
         if self.measured is not None:
             cosine = surface.strength[rows].ravel() * cosine
             for number in np.unique(material):
                 here = _where(material == number)
-                brdf = self.measured.brdf(
-                    materials[number].measured or "",
-                    normal[here],
-                    *_at(here, light_direction, view_direction),
-                )
-                out[here] = np.pi * brdf * cosine[here, None]
+                name, brdf = materials[number].measured or "", np.zeros(out[here].shape)
+                for source in sources:
+                    brdf += self.measured.brdf(name, normal[here], *_at(here, source, view_direction))
+                out[here] = np.pi / len(sources) * brdf * cosine[here, None]
         specular = surface.specular[rows].ravel().astype(np.float64)
         shape = surface.shape[rows].ravel().astype(np.float64)
         tints = np.array([entry.tint for entry in materials])
         models = sorted({entry.model for entry in materials})
         model_of = np.array([models.index(entry.model) for entry in materials])[material]
-        size = float(np.nan_to_num(lights.angular_size_deg[light]))
-        sources = disc_directions(light_direction, size)
         for number in np.unique(model_of):
             here = _where((model_of == number) & (specular > 0))
             lobe = np.zeros(len(specular[here]))

@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 
 from impasto.arm import find_arm
+from impasto.evaluate.curve_plot import MODEL_COLOURS, MODEL_MARKERS
 from impasto.evaluate.per_light import light_errors
 from impasto.geometry import Array, zenith_azimuth
 from impasto.output import written_whole
 from impasto.page import Picture, Section
 from impasto.report.subject import Subject, drawn
-
-_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-_MARKERS = "osD^vP"
 
 
 def section(subject: Subject) -> Section:
@@ -64,8 +62,8 @@ def _draw(path: Path, angle_deg: Array, name: str, errors: Mapping[str, Array]) 
     axes = figure.add_subplot()
     for index, (model, values) in enumerate(errors.items()):
         look: dict[str, Any] = {
-            "color": _COLOURS[index % len(_COLOURS)],
-            "marker": _MARKERS[index % len(_MARKERS)],
+            "color": MODEL_COLOURS[index % len(MODEL_COLOURS)],
+            "marker": MODEL_MARKERS[index % len(MODEL_MARKERS)],
         }
         axes.plot(angle_deg, values, linestyle="none", markerfacecolor="none", label=model, **look)
     axes.set_ylim(bottom=0)
