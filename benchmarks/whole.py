@@ -71,12 +71,14 @@ def measure(capture: Capture, store: Path) -> dict[str, Any]:
     os.sync()  # writing the photographs is not part of the way
     stack = impasto("stack", str(capture.folder), str(store))
     fit = impasto("fit", str(store), "--model", MODEL)
+    report = impasto("report", str(store), str(store.with_suffix(".html")))
     alone = floors["decode"]["seconds"] + fit_alone
     return {
         "megapixels": capture.pixels / 1e6,
         "photographs": len(capture.files),
         "stack": stack,
         "fit": fit,
+        "report": report,
         "decode_alone_s": floors["decode"]["seconds"],
         "fit_alone_s": fit_alone,
         "ratio": (stack["wall_s"] + fit["wall_s"]) / alone,

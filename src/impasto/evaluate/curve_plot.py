@@ -70,9 +70,8 @@ def draw_curve(path: Path, curve: Curve, fits: Mapping[str, Fit]) -> None:
     style = "-" if on_arm else "none"
     for index, (name, model) in enumerate(curve.models.items()):
         look = {"color": MODEL_COLOURS[index % len(MODEL_COLOURS)]}
-        marker = (
-            {} if on_arm else {"marker": MODEL_MARKERS[index % len(MODEL_MARKERS)], "markerfacecolor": "none"}
-        )
+        symbol = MODEL_MARKERS[index % len(MODEL_MARKERS)]
+        marker = {} if on_arm else {"marker": symbol, "markerfacecolor": "none"}
         diffuse, specular = luminance(model.diffuse)[order], luminance(model.specular)[order]
         upper.plot(angle, diffuse + specular, linestyle=style, **look, **marker, linewidth=1.6, label=name)
         if on_arm:

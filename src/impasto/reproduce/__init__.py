@@ -112,11 +112,11 @@ def reproduce(
             if name not in PRINTED
         ],
     )
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise OutputError(Problem(str(folder), "is not empty, expected a new folder", "Give another name"))
     materials = read_measured(Path(measured))
     for name in samples:
         materials.radiance_factor(SAMPLES[name].measured)  # raises for a material that is not there
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise OutputError(Problem(str(folder), "is not empty, expected a new folder", "Give another name"))
     prepare_folder(folder)
     enacted = {}
     for name in dict.fromkeys(samples):
