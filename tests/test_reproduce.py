@@ -64,6 +64,18 @@ def test_the_interface_reads_the_gloss_that_was_printed(shared):
         assert meter.measure(truth) == pytest.approx(PRINTED["a"].gloss[meter.angle_deg], rel=0.05)
 
 
+def test_curves_between_the_lights_go_through_them(made):
+    curve = made.samples["b"].fitted["paper"].curve
+    for model in curve.models.values():
+        for at_lights, along in (
+            (model.diffuse, model.swept.diffuse),
+            (model.specular, model.swept.specular),
+        ):
+            between = np.interp(curve.angle_deg, model.swept.angle_deg, along[:, 1])
+            seen = np.isfinite(at_lights[:, 1])
+            np.testing.assert_allclose(between[seen], at_lights[seen, 1], rtol=1e-3, atol=1e-4)
+
+
 def test_findings_follow_from_the_numbers(made):
     said = " ".join(findings(made.samples))
     better = [

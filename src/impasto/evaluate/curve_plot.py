@@ -73,10 +73,14 @@ def draw_curve(path: Path, curve: Curve, fits: Mapping[str, Fit]) -> None:
         symbol = MODEL_MARKERS[index % len(MODEL_MARKERS)]
         marker = {} if on_arm else {"marker": symbol, "markerfacecolor": "none"}
         diffuse, specular = luminance(model.diffuse)[order], luminance(model.specular)[order]
-        upper.plot(angle, diffuse + specular, linestyle=style, **look, **marker, linewidth=1.6, label=name)
+        at, parts = angle, (diffuse, specular)
+        if model.swept is not None:  # the model between the lights too, where a lobe may lie
+            at = model.swept.angle_deg
+            parts = (luminance(model.swept.diffuse), luminance(model.swept.specular))
+        upper.plot(at, sum(parts), linestyle=style, **look, **marker, linewidth=1.6, label=name)
         if on_arm:
-            upper.plot(angle, diffuse, "--", **look, linewidth=1.0, label=f"{name}: diffuse")
-            upper.plot(angle, specular, ":", **look, linewidth=1.2, label=f"{name}: specular")
+            upper.plot(at, parts[0], "--", **look, linewidth=1.0, label=f"{name}: diffuse")
+            upper.plot(at, parts[1], ":", **look, linewidth=1.2, label=f"{name}: specular")
         marker = marker or {"marker": "."}
         lower.plot(angle, diffuse + specular - measured, linestyle=style, **look, **marker)
     middle = float(np.nanmedian(measured)) if np.isfinite(measured).any() else 0.0

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto.arm import find_arm
-from impasto.geometry import Array, Camera
+from impasto.arm import Arm, find_arm
+from impasto.geometry import Array, Camera, Lights, arm_direction, turn_about_z
 from impasto.models import basis
 from impasto.pixels import Pixels, luminance, render_pixels
 from impasto.store import Stack
@@ -18,7 +18,24 @@ from impasto.store import Stack
 SHOULDER = (1.0, 3.0)
 """Where the shoulder of a highlight begins and ends, in half-widths from the mirror direction."""
 
+_SWEEP_STEP_DEG = 0.25
 _SWEEP_DEG = np.linspace(0.0, 89.0, 1781)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A model under a light of unit strength that moves along the arm.
+
+    Parameters
+    ----------
+    angle_deg : ndarray of shape (A,)
+        Evenly spaced over the lights' range.
+    diffuse, specular : ndarray of shape (A, C), float64
+    """
+
+    angle_deg: Array
+    diffuse: Array
+    specular: Array
 
 
 @dataclass(frozen=True)
@@ -27,6 +44,8 @@ class ModelCurve:
 
     Parameters
     ----------
+    swept : Sweep or None
+        The same between the lights, of a single pixel under lights on an arm.
     diffuse, specular : ndarray of shape (L, C), float64
         Relative radiance per unit of irradiance; `diffuse` includes the ambient term.
     signed_error : dict of str to float or None
@@ -37,6 +56,7 @@ class ModelCurve:
     diffuse: Array
     specular: Array
     signed_error: dict[str, float | None]
+    swept: Sweep | None
 
 
 @dataclass(frozen=True)
@@ -109,7 +129,7 @@ class CurveSums:
         self._models = {model: np.zeros((2, count, channels)) for model in models}
         self._normal = np.zeros(3)
         self._shape: list[Array] = []
-        self._first: Pixels | None = None
+        self._last: dict[str, Pixels] = {}
 
     def add(self, radiance: NDArray[np.float32], fitted: Mapping[str, Pixels]) -> None:
         """Add pixels.
@@ -141,12 +161,12 @@ class CurveSums:
         first = next(iter(chosen.values()))
         self._normal += first.normal.sum(axis=0)
         self._shape.append(first.shape.astype(np.float64))
-        self._first = first
+        self._last = chosen
 
     def curve(self) -> Curve:
         """Return the means; at least one pixel must have been added."""
-        assert self._first is not None
-        first = self._first
+        assert self._last
+        first = next(iter(self._last.values()))
         lights, camera = self._stack.lights, self._stack.camera
         with np.errstate(invalid="ignore"):
             measured = self._measured / self._weight
@@ -178,8 +198,23 @@ class CurveSums:
         )
         for name, (diffuse, specular) in parts.items():
             errors = _signed_errors(curve, diffuse + specular)
-            curve.models[name] = ModelCurve(diffuse, specular, errors)
+            alone = curve.pixel is not None and arm.planar and not lights.near
+            swept = _sweep(self._last[name], angle, arm, camera) if alone else None
+            curve.models[name] = ModelCurve(diffuse, specular, errors, swept)
         return curve
+
+
+def _sweep(pixel: Pixels, angle_deg: Array, arm: Arm, camera: Camera) -> Sweep:
+    """Return what the model of one pixel says along the arm."""
+    count = 1 + round(float(np.ptp(angle_deg)) / _SWEEP_STEP_DEG)
+    angles = np.linspace(angle_deg.min(), angle_deg.max(), count)
+    lights = Lights(
+        names=tuple(f"{angle:g}" for angle in angles),
+        direction=turn_about_z(arm_direction(np.radians(angles)), arm.azimuth),
+    )
+    matte = replace(pixel, specular=np.zeros_like(pixel.specular))
+    total, diffuse = (render_pixels(each, lights, camera)[:, 0].astype(np.float64) for each in (pixel, matte))
+    return Sweep(angles, diffuse, total - diffuse)
 
 
 def half_width_deg(pixels: Pixels, shape: Array, normal: Array, camera: Camera) -> float:
