@@ -76,3 +76,18 @@ def test_what_cannot_be_shown_is_refused(painting, tmp_path):
         impasto.gonio(painting, out=tmp_path, models=["gloss"])
     with pytest.raises(OptionError, match="outside"):
         impasto.gonio(painting, out=tmp_path, pixels=[(-1, 0)])
+
+
+def test_a_place_without_a_fit_is_refused(capture, tmp_path):
+    """All samples count as shadowed, so too few lights are left for any pixel."""
+    few = tmp_path / "few.zarr"
+    impasto.stack(capture, few)
+    impasto.fit(few, models=["torrance-sparrow"], options=impasto.FitOptions(shadow_level=100.0))
+    with pytest.raises(OptionError, match="no models to show"):
+        impasto.gonio(few, out=tmp_path / "out", pixels=[(3, 5)])
+    with pytest.raises(OptionError, match="no pixel has a highlight"):
+        impasto.gonio(few, out=tmp_path / "out")
+    with pytest.raises(OptionError, match="no pixel has all parameters"):
+        impasto.compare(few)
+    with pytest.raises(OptionError, match="no gloss to predict"):
+        impasto.gloss(few, model="torrance-sparrow")

@@ -106,7 +106,7 @@ def compare(
     Raises
     ------
     OptionError
-        If a model or the regions cannot be used, or nothing is fitted.
+        If a model or the regions cannot be used, nothing is fitted, or no pixel could be.
     StoreError
         If there is no such store or a fit is missing.
     OutputError
@@ -133,6 +133,14 @@ def compare(
                 chosen = tally.add(radiance, fitted, label[rows, columns].ravel())
                 choice[rows, columns] = chosen.reshape(choice[rows, columns].shape)
                 advance(chosen.size)
+    if not choice.any():
+        raise OptionError(
+            Problem(
+                where=f"{path}: {', '.join(names)}",
+                what="no pixel has all parameters of these models, so nothing can be compared",
+                do="Look at the notes and the statuses of impasto fit; take photographs under more lights",
+            )
+        )
     samples = {name: sample_regions(fit, divided, _SAMPLED, show=show_progress) for name, fit in fits.items()}
     found = tally.result(
         {model: {name: specular_ratio(s.pixels) for name, s in of.items()} for model, of in samples.items()}

@@ -164,8 +164,7 @@ class CurveSums:
         self._last = chosen
 
     def curve(self) -> Curve:
-        """Return the means; at least one pixel must have been added."""
-        assert self._last
+        """Return the means; pixels must have been added, with a fit or without."""
         first = next(iter(self._last.values()))
         lights, camera = self._stack.lights, self._stack.camera
         with np.errstate(invalid="ignore"):

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
 from impasto.band_writers import BandWriter
+from impasto.errors import OptionError, Problem
 from impasto.evaluate.clusters import choose_regions
 from impasto.evaluate.glossmeter import GLOSSMETERS, Glossmeter, quadrature
 from impasto.evaluate.regions import WHOLE, Sample, check_inside, sample_regions
@@ -146,7 +147,8 @@ def gloss(
     Raises
     ------
     OptionError
-        If the model or the regions cannot be used, or a pixel lies outside of the painting.
+        If the model or the regions cannot be used, a pixel lies outside of the painting, or no pixel has a
+        highlight that is known.
     StoreError
         If there is no such store or no such complete fit.
     OutputError
@@ -166,6 +168,14 @@ def gloss(
     folder = prepare_folder(out) if out else None
     tables = [PixelGloss(spec, fit.attributes, meter) for meter in GLOSSMETERS]
     samples = sample_regions(fit, divided, _SAMPLED, show=show_progress)
+    if not samples[WHOLE].known:
+        raise OptionError(
+            Problem(
+                where=f"{store}: {fit.group}",
+                what="no pixel has a highlight that the photographs tell, so there is no gloss to predict",
+                do="Look at the notes and the statuses of impasto fit; take photographs under more lights",
+            )
+        )
     found = [_region(name, sample, tables) for name, sample in samples.items()]
     found += [_pixel(fit, column, row, tables) for column, row in pixels]
     files = _write_maps(folder, fit, tables, stack.absolute, show_progress) if folder else ()

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from impasto.errors import OptionError, Problem, raise_problems
 from impasto.evaluate.clusters import choose_regions, write_regions
 from impasto.evaluate.compare import ordered_fits
 from impasto.evaluate.curve_plot import draw_curve
@@ -86,7 +87,8 @@ def gonio(
     Raises
     ------
     OptionError
-        If a model or a region cannot be used, nothing is fitted, or a pixel lies outside of the painting.
+        If a model or a region cannot be used, nothing is fitted, or a pixel lies outside of the painting or,
+        like a region, has no fit.
     StoreError
         If there is no such store or a fit is missing.
     OutputError
@@ -110,6 +112,7 @@ def gonio(
     if divided is not None:
         curves += _region_curves(divided, stack, fits, show_progress)
         files += write_regions(folder, divided) if clusters else []
+    raise_problems(OptionError, [_unknown(curve, names) for curve in curves if not curve.pixels])
     for curve in curves:
         stem = folder / re.sub(r"[^0-9A-Za-z]+", "-", curve.name).strip("-")
         write_text(stem.with_suffix(".csv"), _csv(curve))
@@ -158,6 +161,14 @@ def _add(
         radiance = radiance[:, chosen]
         fitted = {name: pixels.select(chosen) for name, pixels in fitted.items()}
     sums.add(radiance, fitted)
+
+
+def _unknown(curve: Curve, models: Sequence[str]) -> Problem:
+    return Problem(
+        where=curve.name,
+        what=f"has no pixel with all parameters of {', '.join(models)}, so there are no models to show",
+        do="Choose another place; the status map of impasto maps tells where there are values",
+    )
 
 
 def _csv(curve: Curve) -> str:

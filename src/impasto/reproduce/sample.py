@@ -13,6 +13,7 @@ from impasto.capture.simulate import simulate
 from impasto.capture.simulate.materials import specular_term
 from impasto.capture.simulate.measured import MeasuredSet
 from impasto.capture.simulate.presets import SAMPLES
+from impasto.errors import OptionError
 from impasto.evaluate.compare import compare
 from impasto.evaluate.curves import Curve
 from impasto.evaluate.gloss import gloss
@@ -44,9 +45,10 @@ class FittedSample:
     procedure : str
         ``paper``, ``refined`` or ``joint``.
     models : dict of str to ModelComparison
+        Empty, like `gloss`, where the highlights are not identified.
     gloss : dict of float to float
         What Torrance-Sparrow says that a glossmeter reads, its pixels laid flat: their median by angle, gloss
-        units; NaN where the highlight is not identified.
+        units.
     curve : Curve or None
         At the pixel whose highlight has the 99th percentile of the heights.
     plot : Path or None
@@ -123,8 +125,18 @@ def enact(
     for procedure, (how, options) in PROCEDURES.items():
         store = folder / f"{procedure}.zarr"
         stack(folder / "photos", store, show_progress=show_progress)
-        notes = fit(store, models=MODELS, procedure=how, options=options, show_progress=show_progress).notes
-        fitted[procedure] = _judge(store, folder / f"curves-{procedure}", procedure, notes, show_progress)
+        said: list[str] = []
+        fit(
+            store,
+            models=MODELS,
+            procedure=how,
+            options=options,
+            say=said.append,
+            show_progress=show_progress,
+        )
+        fitted[procedure] = _judge(
+            store, folder / f"curves-{procedure}", procedure, tuple(said), show_progress
+        )
     sample = SAMPLES[name]
     return VirtualSample(
         name=name,
@@ -139,18 +151,18 @@ def enact(
 def _judge(
     store: Path, curves: Path, procedure: str, notes: tuple[str, ...], show_progress: bool | None
 ) -> FittedSample:
-    whole = compare(store, models=MODELS, show_progress=show_progress).regions[0]
+    try:
+        whole = compare(store, models=MODELS, show_progress=show_progress).regions[0]
+    except OptionError:  # no pixel's highlight is identified, as the notes say
+        return FittedSample(procedure, {}, {}, None, None, notes)
     readings = gloss(store, model=MODELS[0], show_progress=show_progress).regions[0].readings
-    curve, plot = None, None
-    if whole.pixels:
-        shown = gonio(store, out=curves, models=MODELS, show_progress=show_progress)
-        curve, plot = shown.curves[0], shown.files[0]
+    shown = gonio(store, out=curves, models=MODELS, show_progress=show_progress)
     return FittedSample(
         procedure=procedure,
         models={model.model: model for model in whole.models},
         gloss={reading.angle_deg: reading.median for reading in readings},
-        curve=curve,
-        plot=plot,
+        curve=shown.curves[0],
+        plot=shown.files[0],
         notes=notes,
     )
 

@@ -42,7 +42,7 @@ def _gloss_table(samples: Mapping[str, VirtualSample]) -> Table:
     for name, sample in samples.items():
         for angle, truth in sample.gloss.items():
             printed = PRINTED[name].gloss.get(angle)
-            cells = (_number(sample.fitted[procedure].gloss[angle]) for procedure in PROCEDURES)
+            cells = (_number(sample.fitted[procedure].gloss.get(angle, math.nan)) for procedure in PROCEDURES)
             was = "not printed" if printed is None else f"{printed:g}"
             rows.append((f"{name}, {angle:.0f}°", was, _number(truth), *cells))
     header = ("sample and angle", "printed", "our true material", *(f"fitted, {p}" for p in PROCEDURES))
@@ -59,9 +59,11 @@ def _error_table(samples: Mapping[str, VirtualSample]) -> Table:
         for model in MODELS:
             cells = []
             for procedure in PROCEDURES:
-                found = sample.fitted[procedure].models[model]
+                found = sample.fitted[procedure].models.get(model)
                 cells.append(
-                    f"{_number(found.rms)} ({_number(found.rms_highlight)}, {_number(found.rms_elsewhere)})"
+                    f"{found.rms:.3g} ({found.rms_highlight:.3g}, {found.rms_elsewhere:.3g})"
+                    if found
+                    else _UNKNOWN
                 )
             rows.append((f"{name}, {model}", *cells))
     return "RMS / mean over all lights (at highlights, elsewhere)", ("sample and model", *PROCEDURES), rows
@@ -86,34 +88,32 @@ def findings(samples: Mapping[str, VirtualSample]) -> Iterator[str]:
         for model in MODELS:
             pairs = []
             for name, sample in samples.items():
-                ratio = sample.fitted[procedure].models[model].ratio
+                found = sample.fitted[procedure].models.get(model)
                 printed = PRINTED[name]
-                if ratio:
+                if found and found.ratio:
                     was = printed.ratio_torrance_sparrow if model == MODELS[0] else printed.ratio_phong
-                    pairs.append((was, ratio.mean))
+                    pairs.append((was, found.ratio.mean))
             if len(pairs) > 2:
                 order = float(spearmanr(*zip(*pairs, strict=True)).statistic)
                 yield (
                     f"As/Ad of {model} by the {procedure} procedure: rank correlation {order:.2f} with the "
                     f"printed order of {len(pairs)} samples"
                 )
-        better = [
-            name
+        errors = {
+            name: [model.rms for model in sample.fitted[procedure].models.values()]
             for name, sample in samples.items()
-            if _rms(sample.fitted[procedure], MODELS[0]) < _rms(sample.fitted[procedure], MODELS[1])
-        ]
+            if sample.fitted[procedure].models
+        }
+        better = [name for name, (first, second) in errors.items() if first < second]
         yield (
             f"{procedure} procedure: Torrance-Sparrow has the smaller error in {len(better)} of "
-            f"{len(samples)} samples ({', '.join(better) or 'none'})"
+            f"{len(errors)} samples ({', '.join(better) or 'none'})"
         )
 
 
-def _rms(fitted: FittedSample, model: str) -> float:
-    return fitted.models[model].rms
-
-
 def _ratio(fitted: FittedSample, model: str) -> str:
-    ratio = fitted.models[model].ratio
+    found = fitted.models.get(model)
+    ratio = found.ratio if found else None
     return _UNKNOWN if ratio is None else f"{ratio.mean:.4g} ({ratio.low:.3g} – {ratio.high:.3g})"
 
 
