@@ -4,12 +4,12 @@ import json
 
 import numpy as np
 import pytest
+from tests.calibrate.shots import take_shots
 
 import impasto
 from impasto.calibrate.colour_fit import ciede2000, fit_colour, lab
 from impasto.calibrate.targets import spectra_to_xyz
 from impasto.errors import CaptureError, OptionError
-from tests.calibrate.shots import take_shots
 
 colour = pytest.importorskip("colour")
 TARGET = "ColorChecker24 - After November 2014"

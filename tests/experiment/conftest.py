@@ -4,11 +4,13 @@ import os
 import secrets
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from laboratory import ADMIN_TOKEN, free_port, new_postgresql_database
+from benchmarks.experiment_server import ADMIN_TOKEN, free_port
+from laboratory import new_postgresql_database
 
 import impasto
 from impasto.psychophysics.experiment.database import database_url, open_database
@@ -52,14 +54,19 @@ def _postgresql_programs() -> Path | None:
 
 
 @pytest.fixture(scope="session")
-def postgresql(tmp_path_factory) -> Iterator[str]:
+def postgresql() -> Iterator[str]:
     """Return the address of a PostgreSQL server of our own, on loopback, that is gone after the tests."""
     programs = _postgresql_programs()
     if programs is None:
         reason = "PostgreSQL is not installed: make postgresql"
         # Where a machine tests every change, nothing may be left out unseen.
         (pytest.fail if os.environ.get("CI") else pytest.skip)(reason)
-    folder = tmp_path_factory.mktemp("postgresql")
+    # Not in pytest's own folder, which it closes to all other accounts.
+    with tempfile.TemporaryDirectory(prefix="impasto-postgresql-") as name:
+        yield from _serve_postgresql(programs, Path(name))
+
+
+def _serve_postgresql(programs: Path, folder: Path) -> Iterator[str]:
     password = secrets.token_urlsafe(12)
     (folder / "password").write_text(password)
     port = free_port()
@@ -67,12 +74,11 @@ def postgresql(tmp_path_factory) -> Iterator[str]:
     if os.geteuid() == 0:  # PostgreSQL refuses to run as root
         as_user = ["setpriv", "--reuid=postgres", "--regid=postgres", "--clear-groups"]
         subprocess.run(["chown", "-R", "postgres:postgres", folder], check=True)
-        for parent in folder.parents:
-            if parent.stat().st_uid == 0 and not parent.stat().st_mode & 0o001:
-                parent.chmod(parent.stat().st_mode | 0o011)
 
     def run(*command):
-        return subprocess.run([*as_user, *command], check=True, capture_output=True, text=True, cwd=folder)
+        # Into a file: the server keeps what it is given open for as long as it runs.
+        with (folder / "output").open("ab") as output:
+            subprocess.run([*as_user, *command], check=True, stdout=output, stderr=output, cwd=folder)
 
     data = folder / "data"
     run(

@@ -4,7 +4,7 @@ import itertools
 import json
 
 import pytest
-from laboratory import Observer, ServerProcess
+from benchmarks.experiment_server import Observer, ServerProcess
 
 import impasto
 from impasto.psychophysics.experiment.answers import answer_rows

@@ -2,8 +2,9 @@
 
 import pytest
 import schemathesis
+from benchmarks.experiment_server import ADMIN_TOKEN
 from hypothesis import HealthCheck, Phase, given, settings
-from laboratory import ADMIN_TOKEN, new_postgresql_database
+from laboratory import new_postgresql_database
 from schemathesis import GenerationMode
 
 from impasto.psychophysics.experiment.database import database_url, open_database

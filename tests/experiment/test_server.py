@@ -3,7 +3,8 @@
 import re
 
 import pytest
-from laboratory import ADMIN_TOKEN, WINDOW
+from benchmarks.experiment_server import ADMIN_TOKEN
+from laboratory import WINDOW
 from starlette.testclient import TestClient
 
 from impasto.psychophysics.experiment.answers import answer_rows

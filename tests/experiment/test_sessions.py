@@ -74,9 +74,9 @@ def test_coming_pictures_are_announced(session):
 
 def test_an_answer_counts_once(session, engine):
     trial = session.next_trial()
-    assert session.answer(trial.token, "left", 1.0, WINDOW) == ("left", False)
-    assert session.answer(trial.token, "left", 1.0, WINDOW) == ("left", True)
-    assert session.answer(trial.token, "right", 9.0, WINDOW) == ("left", True)
+    assert session.answer(trial.token, "left", 1.0, WINDOW)[:2] == ("left", False)
+    assert session.answer(trial.token, "left", 1.0, WINDOW)[:2] == ("left", True)
+    assert session.answer(trial.token, "right", 9.0, WINDOW)[:2] == ("left", True)
     (row,) = answer_rows(engine)
     assert row["time"] == 1.0
 
@@ -87,7 +87,7 @@ def test_an_answer_sent_many_times_at_once_counts_once(session, engine):
 
     def send(side):
         start.wait()
-        return session.answer(trial.token, side, 1.0, WINDOW)
+        return session.answer(trial.token, side, 1.0, WINDOW)[:2]
 
     with ThreadPoolExecutor(8) as pool:
         given = list(pool.map(send, ["left", "right"] * 4))
@@ -99,8 +99,9 @@ def test_an_answer_sent_many_times_at_once_counts_once(session, engine):
 def test_the_same_trial_is_next_until_it_is_answered(session):
     first = session.next_trial()
     assert session.next_trial() == first
-    session.answer(first.token, "tie", 1.0, WINDOW)
-    assert session.next_trial().number == first.number + 1
+    _, _, following = session.answer(first.token, "tie", 1.0, WINDOW)
+    assert session.next_trial() == following
+    assert following.number == first.number + 1
 
 
 def test_what_is_refused(session, engine, experiment):

@@ -250,8 +250,10 @@ class Session:
         with self._engine.begin() as connection:
             return self._next(connection)
 
-    def answer(self, token: str, side: Side, response_s: float, window: dict[str, Any]) -> tuple[Side, bool]:
-        """Store an answer, unless the trial has one.
+    def answer(
+        self, token: str, side: Side, response_s: float, window: dict[str, Any]
+    ) -> tuple[Side, bool, Trial | None]:
+        """Store an answer, unless the trial has one, and show the next trial, both in one transaction.
 
         Parameters
         ----------
@@ -270,6 +272,8 @@ class Session:
             The answer that the trial has now: the first that was given.
         already : bool
             Whether it had that one before.
+        following : Trial or None
+            As `next_trial` returns it.
 
         Raises
         ------
@@ -289,7 +293,7 @@ class Session:
             if trial.shown_at is None:
                 raise Refused("this trial was not shown yet")
             if trial.choice is not None:
-                return _side(trial.choice, trial.a_left), True
+                return _side(trial.choice, trial.a_left), True, self._next(connection)
             values = {
                 "choice": "tie" if side == "tie" else "AB"[(side == "left") != trial.a_left],
                 "answered_at": now(),
@@ -297,7 +301,7 @@ class Session:
                 "window": window,
             }
             connection.execute(update(trials).where(trials.c.id == trial.id).values(values))
-            return side, False
+            return side, False, self._next(connection)
 
     def _next(self, connection: Connection) -> Trial | None:
         consent = select(steps.c.name).where(steps.c.session_id == self.id, steps.c.name == "consent")

@@ -69,10 +69,10 @@ def next_trial(session: Own) -> Next:
 def record_answer(session: Own, answer: Answer) -> Recorded:
     """Store the answer to a trial, once, and return the next."""
     with _allowed():
-        choice, already = session.answer(
+        choice, already, following = session.answer(
             answer.token, answer.choice, answer.response_s, answer.window.model_dump()
         )
-        return Recorded(choice=choice, already=already, trial=_shown(session.next_trial()))
+        return Recorded(choice=choice, already=already, trial=_shown(following))
 
 
 @router.get(
