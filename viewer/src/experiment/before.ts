@@ -10,6 +10,7 @@ export async function askForCode(display: HTMLElement, message: string): Promise
     make("p", {}, message),
     field("Code", { name: "code", required: true, autocomplete: "off", spellcheck: "false", maxlength: 40 }),
   ]);
+  display.replaceChildren();
   return value(filled, "code");
 }
 
