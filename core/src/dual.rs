@@ -1,4 +1,7 @@
 //! Forward-mode automatic differentiation: a value and its derivatives with respect to P parameters.
+//!
+//! A [`Dual`] takes directions of light and view as plain numbers, since they are given; a [`Steered`] number takes them as
+//! functions of the parameters too.
 
 use crate::number::{Number, Real};
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -148,5 +151,92 @@ impl<R: Real, const P: usize> Number for Dual<R, P> {
             derivative[i] = R::select(mask, yes.derivative[i], derivative[i]);
         }
         Dual { value: R::select(mask, yes.value, no.value), derivative }
+    }
+}
+
+/// A dual number that is its own `Real`: all that a model computes with, directions included, may have derivatives.
+#[derive(Clone, Copy, Debug)]
+pub struct Steered<R, const P: usize>(pub Dual<R, P>);
+
+impl<R: Real, const P: usize> Steered<R, P> {
+    /// As [`Dual::parameter`].
+    #[inline(always)]
+    pub fn parameter(value: R, index: usize, slope: R) -> Self {
+        Steered(Dual::parameter(value, index, slope))
+    }
+}
+
+impl<R: Real, const P: usize> Neg for Steered<R, P> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Steered(-self.0)
+    }
+}
+
+macro_rules! steered_operators {
+    ($($trait:ident $operation:ident),*) => {
+        $(impl<R: Real, const P: usize> $trait for Steered<R, P> {
+            type Output = Self;
+            #[inline(always)]
+            fn $operation(self, other: Self) -> Self {
+                Steered(self.0.$operation(other.0))
+            }
+        })*
+    };
+}
+steered_operators!(Add add, Sub sub, Mul mul, Div div);
+
+impl<R: Real, const P: usize> Number for Steered<R, P> {
+    type Real = Self;
+
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        Steered(Dual::splat(value))
+    }
+    #[inline(always)]
+    fn constant(value: Self) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn value(self) -> Self {
+        self
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Steered(self.0.sqrt())
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        Steered(self.0.exp())
+    }
+    #[inline(always)]
+    fn ln_1p(self) -> Self {
+        Steered(self.0.ln_1p())
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        Steered(self.0.mul_add(factor.0, addend.0))
+    }
+    #[inline(always)]
+    fn scale_add(self, factor: Self, addend: Self) -> Self {
+        self.mul_add(factor, addend)
+    }
+    #[inline(always)]
+    fn scale(self, factor: Self) -> Self {
+        self * factor
+    }
+    #[inline(always)]
+    fn select(mask: R::Mask, yes: Self, no: Self) -> Self {
+        Steered(Dual::select(mask, yes.0, no.0))
+    }
+}
+
+impl<R: Real, const P: usize> Real for Steered<R, P> {
+    type Mask = R::Mask;
+
+    #[inline(always)]
+    fn lt(self, other: Self) -> R::Mask {
+        self.0.value.lt(other.0.value)
     }
 }

@@ -3,7 +3,7 @@
 //! Free are the view's tilt θv in the arm's plane (φv = 0), the logarithm of the shape parameter, and an empirical tilt φn
 //! of the normal out of that plane.
 
-use crate::dual::Dual;
+use crate::dual::{Dual, Steered};
 use crate::geometry::{Illumination, dot, normalise};
 use crate::lanes::{Isa, Lane, LaneMask, outlined};
 use crate::minimise::{Objective, Quadratic};
@@ -122,22 +122,24 @@ impl<'a, M: Model, const ISA: Isa> ShapeFit<'a, M, ISA> {
         view: Option<[Lane<ISA>; 3]>,
         tilts: [Lane<ISA>; PHI_STARTS.len()],
     ) -> (Lane<ISA>, Lane<ISA>) {
-        let mut best_cost = Lane::splat(f64::from(f32::MAX));
-        let mut best = (Lane::splat(M::STARTS[0][0].ln()), tilts[0]);
-        for tilt in tilts {
-            let normal = self.normal(tilt);
-            let mut costs = [Lane::splat(0.0); MAX_STARTS];
-            for (remainder, calibrated) in self.remainders.iter().zip(self.illuminations) {
-                let mut at = *calibrated;
-                if let Some(view) = view {
-                    at = Illumination::new(at.light, view, self.optics.index);
-                }
+        let normals: [_; PHI_STARTS.len()] = array!(|i| self.normal(tilts[i]));
+        let mut costs = [[Lane::splat(0.0); MAX_STARTS]; PHI_STARTS.len()];
+        for (remainder, calibrated) in self.remainders.iter().zip(self.illuminations) {
+            let mut at = *calibrated;
+            if let Some(view) = view {
+                at = Illumination::new(at.light, view, self.optics.index);
+            }
+            for (normal, costs) in normals.iter().zip(&mut costs) {
                 for (cost, shape) in costs.iter_mut().zip(M::STARTS) {
-                    let lobe = M::basis(normal, &[Lane::splat(shape[0])], &at, &self.optics).specular[0];
+                    let lobe = M::basis(*normal, &[Lane::splat(shape[0])], &at, &self.optics).specular[0];
                     let residual = remainder.value - self.specular * lobe;
                     *cost = (remainder.weight * residual).mul_add(residual, *cost);
                 }
             }
+        }
+        let mut best_cost = Lane::splat(f64::from(f32::MAX));
+        let mut best = (Lane::splat(M::STARTS[0][0].ln()), tilts[0]);
+        for (tilt, costs) in tilts.into_iter().zip(&costs) {
             for (cost, shape) in costs.iter().zip(M::STARTS) {
                 let better = cost.lt(best_cost);
                 best_cost = Lane::select(better, *cost, best_cost);
@@ -171,29 +173,23 @@ impl<'a, M: Model, const ISA: Isa> ShapeFit<'a, M, ISA> {
 
     #[inline(always)]
     fn quadratic_inline(&self, point: &Tilts<ISA>) -> Quadratic<ISA, 3> {
+        // The models' own directions carry the derivative by the view.
+        let (sine, cosine) = sine_cosine(point.view);
+        let view = [Steered::parameter(sine, 0, cosine), Steered::splat(0.0), Steered::parameter(cosine, 0, -sine)];
         let shape = point.shape_log.exp();
-        let dual_shape = Dual::<_, 2>::parameter(shape, 0, shape);
+        let shape = Steered::<_, 3>::parameter(shape, 1, shape);
         let (sine, cosine) = sine_cosine(point.phi);
         let normal = rotated(self.normal, sine, cosine);
         let slope = rotated(self.normal, cosine, -sine);
-        let dual_normal = array!(|i| Dual::<_, 2>::parameter(normal[i], 1, slope[i]));
-        let (sine, cosine) = sine_cosine(point.view);
-        let view = [sine, Lane::splat(0.0), cosine];
-        // The models carry no derivative by the view: a difference over a small part of the lobe's width serves, for the
-        // slopes only steer the steps.
-        let step = (shape * Lane::splat(0.01)).max(Lane::splat(2e-4)).min(Lane::splat(2e-3));
-        let per_step = Lane::splat(1.0) / step;
-        let (sine, cosine) = sine_cosine(point.view + step);
-        let view_ahead = [sine, Lane::splat(0.0), cosine];
+        let normal = array!(|i| Steered::parameter(normal[i], 2, slope[i]));
 
         let mut quadratic = Quadratic::zero();
         quadratic.cost = self.constant;
         for (remainder, calibrated) in self.remainders.iter().zip(self.illuminations) {
-            let at = Illumination::new(calibrated.light, view, self.optics.index);
-            let lobe = M::basis(dual_normal, &[dual_shape], &at, &self.optics).specular[0];
-            let at_ahead = Illumination::new(at.light, view_ahead, self.optics.index);
-            let ahead = M::basis(normal, &[shape], &at_ahead, &self.optics).specular[0];
-            let slopes = [(ahead - lobe.value) * per_step, lobe.derivative[0], lobe.derivative[1]];
+            let light = array!(|i| Steered(Dual::constant(calibrated.light[i])));
+            let at = Illumination::new(light, view, self.optics.index);
+            let Steered(lobe) = M::basis(normal, &[shape], &at, &self.optics).specular[0];
+            let slopes = lobe.derivative;
             let residual = remainder.value - self.specular * lobe.value;
             quadratic.cost = (remainder.weight * residual).mul_add(residual, quadratic.cost);
             for p in 0..3 {
