@@ -59,6 +59,8 @@ def test_commands_stand_in_the_order_of_the_pipeline():
         "gonio",
         "gloss",
         "experiment",
+        "observers",
+        "scale",
         "report",
         "view",
         "publish",

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from impasto.geometry import Camera, Lights
     from impasto.maps import maps
     from impasto.psychophysics import experiment
+    from impasto.psychophysics.planning import observers
+    from impasto.psychophysics.scaling.scale import scale
     from impasto.publish import publish
     from impasto.render import render
     from impasto.report import report
@@ -49,11 +51,13 @@ __all__ = [
     "gonio",
     "maps",
     "models",
+    "observers",
     "open",
     "publish",
     "render",
     "report",
     "reproduce",
+    "scale",
     "simulate",
     "stack",
     "view",
@@ -75,11 +79,13 @@ _HOME = {
     "gonio": "evaluate.gonio",
     "maps": "maps",
     "models": "models",
+    "observers": "psychophysics.planning",
     "open": "store",
     "publish": "publish",
     "render": "render",
     "report": "report",
     "reproduce": "reproduce",
+    "scale": "psychophysics.scaling.scale",
     "simulate": "capture.simulate",
     "stack": "stack",
     "view": "view",

@@ -21,6 +21,8 @@ COMMANDS = (
     "gonio",
     "gloss",
     "experiment",
+    "observers",
+    "scale",
     "report",
     "view",
     "publish",

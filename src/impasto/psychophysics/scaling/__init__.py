@@ -1,0 +1,1 @@
+"""From answers to an interval scale, its limits, and what may be wrong with it."""
