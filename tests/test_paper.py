@@ -187,7 +187,8 @@ def test_options_of_the_other_procedure_are_refused_and_do_not_identify_a_fit(bu
     with pytest.raises(OptionError, match="no option of the joint procedure"):
         impasto.fit(bumpy.store, procedure="joint", options=FitOptions(threshold_deg=20.0, refined=True))
     _, joint = fitted(bumpy, LITERAL, procedure="joint")
-    assert set(joint["options"]) == {"loss", "loss_scale", "max_steps", "shadow_level", "exclude"}
+    own = {"loss", "loss_scale", "residual", "residual_components", "self_calibrate"}
+    assert set(joint["options"]) == {"max_steps", "shadow_level", "exclude", *own}
     _, paper = fitted(bumpy, LITERAL)
     own = {"refined", "threshold_deg", "highlight"}
     assert set(paper["options"]) == {"max_steps", "shadow_level", "exclude", *own}
