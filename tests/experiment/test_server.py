@@ -1,6 +1,7 @@
 """The server: what it stores, whom it lets in, and what it refuses."""
 
 import re
+from statistics import NormalDist
 
 import pytest
 from benchmarks.experiment_server import ADMIN_TOKEN
@@ -9,10 +10,11 @@ from starlette.testclient import TestClient
 
 from impasto.psychophysics.experiment.answers import answer_rows
 from impasto.psychophysics.experiment.database import trials
+from impasto.psychophysics.experiment.manifest import session_trials
 from impasto.psychophysics.experiment.server.app import make_app
 from impasto.psychophysics.experiment.server.limits import Limits, Rate
 from impasto.psychophysics.experiment.server.state import Served
-from impasto.psychophysics.experiment.sessions import invite_observers
+from impasto.psychophysics.experiment.sessions import Session, invite_observers
 
 ADMIN = {"Authorization": f"Bearer {ADMIN_TOKEN}"}
 
@@ -101,6 +103,7 @@ OBSERVER_REQUESTS = [
 ADMIN_REQUESTS = [
     ("GET", "/api/admin/experiment", None),
     ("GET", "/api/admin/sessions", None),
+    ("GET", "/api/admin/scale", None),
     ("GET", "/api/admin/answers.csv", None),
     ("GET", "/api/admin/answers.json", None),
     ("POST", "/api/admin/observers", {}),
@@ -280,6 +283,32 @@ def test_the_laboratory_invites_watches_and_deletes(client, served):
     assert client.delete("/api/admin/observers/O001", headers=ADMIN).status_code == 404
     assert client.get("/api/session", headers=bearer(code)).status_code == 401
     assert len(client.get("/api/admin/answers.csv", headers=ADMIN).text.splitlines()) == 1
+
+
+def test_the_laboratory_sees_the_scale_so_far(client, served):
+    empty = client.get("/api/admin/scale", headers=ADMIN).json()
+    assert (empty["answers"], empty["status"]) == (0, "disconnected")
+    assert [entry["scale"] for entry in empty["conditions"]] == [None, None]
+    # Fourteen of sixteen answers for the first model.
+    for number, invitation in enumerate(invite_observers(served.engine, served.experiment, observers=4)):
+        session = Session.by_code(served.engine, served.experiment, invitation.code)
+        session.record_step("consent", {"agreed": True})
+        plans = session_trials(served.experiment, number)
+        others = 2 if number == 0 else 0
+        trial = session.next_trial()
+        while trial:
+            plan = plans[trial.number - 1]
+            first = True
+            if plan.kind == "test" and others:
+                first, others = False, others - 1
+            side = "left" if plan.a_left == first else "right"
+            *_, trial = session.answer(trial.token, side, 1.0, WINDOW)
+    found = client.get("/api/admin/scale", headers=ADMIN).json()
+    assert (found["answers"], found["observers"], found["status"]) == (16, 4, "converged")
+    first, second = found["conditions"]
+    assert (first["chosen"], first["asked"]) == (14, 16)
+    # Case V of two conditions: the difference is the normal deviate of 14/16.
+    assert first["scale"] - second["scale"] == pytest.approx(NormalDist().inv_cdf(14 / 16), abs=1e-6)
 
 
 def test_a_database_that_is_away_is_said_to_be(client, codes, served, monkeypatch):

@@ -134,8 +134,9 @@ describe("pictures", () => {
   });
 
   it("of 400 pixels fit a display of 1280 x 800", () => {
-    const needed = room({ width: 400, height: 400 }, 3, 1);
-    expect(needed).toEqual({ width: 1280, height: 700 });
+    const size = { width: 400, height: 400 };
+    expect(room(size, "beside", 1)).toEqual({ width: 1280, height: 700 });
+    expect(room(size, "alternating", 1)).toEqual({ width: 820, height: 780 });
   });
 });
 

@@ -22,6 +22,8 @@ interface SessionState {
 
 interface Scaled {
   condition: string;
+  chosen: number;
+  asked: number;
   scale: number | null;
   standard_error: number | null;
 }
@@ -111,8 +113,13 @@ function scaleTable(scale: LiveScale): HTMLElement {
     {},
     make("p", {}, `${scale.answers} answers of ${scale.observers} observers; ${scale.status}`),
     table(
-      ["Condition", `Scale, ${scale.unit}`, "Standard error"],
-      scale.conditions.map((entry) => [entry.condition, shown(entry.scale), shown(entry.standard_error)]),
+      ["Condition", "Chosen", `Scale, ${scale.unit}`, "Standard error"],
+      scale.conditions.map((entry) => [
+        entry.condition,
+        share(entry.chosen, entry.asked),
+        shown(entry.scale),
+        shown(entry.standard_error),
+      ]),
     ),
   );
 }

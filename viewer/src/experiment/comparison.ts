@@ -197,7 +197,7 @@ class Comparison {
         this.images[where].style[side] = `${box[side]}px`;
       }
     }
-    const needed = room(this.size, this.alternating ? 1 : 3, ratio);
+    const needed = room(this.size, this.session.layout, ratio);
     this.fits = needed.width <= inner.width && needed.height <= inner.height;
     this.tooSmall.hidden = this.fits;
     this.tooSmall.textContent = `The pictures need a window of ${Math.ceil(needed.width)} × ${Math.ceil(needed.height)}; \

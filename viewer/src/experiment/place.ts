@@ -12,14 +12,16 @@ export interface Box extends Size {
 }
 
 const GAP_PX = 20;
-/** Room for the buttons below, and as much above, which keeps the pictures in the middle. */
-const BELOW_PX = 150;
+/** Height of the buttons below; as much is left above, which keeps the pictures in the middle. */
+const BELOW_PX = { beside: 150, alternating: 190 };
+const BUTTONS_PX = 820;
 
-/** Return the room that pictures of a size need, in CSS pixels, for `across` of them side by side. */
-export function room(picture: Size, across: number, ratio: number): Size {
+/** Return the room that pictures of a size need in a layout, in CSS pixels. */
+export function room(picture: Size, layout: keyof typeof BELOW_PX, ratio: number): Size {
+  const across = layout === "beside" ? 3 : 1;
   return {
-    width: (across * picture.width + (across + 1) * GAP_PX) / ratio,
-    height: picture.height / ratio + 2 * BELOW_PX,
+    width: Math.max(BUTTONS_PX, (across * picture.width + (across + 1) * GAP_PX) / ratio),
+    height: picture.height / ratio + 2 * BELOW_PX[layout],
   };
 }
 

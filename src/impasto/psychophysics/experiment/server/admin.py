@@ -13,6 +13,7 @@ from impasto.psychophysics.experiment.answers import (
     answers_json,
     session_states,
 )
+from impasto.psychophysics.experiment.live_scale import LiveScale, live_scale
 from impasto.psychophysics.experiment.manifest import ExperimentError
 from impasto.psychophysics.experiment.server.access import DENIED, laboratory
 from impasto.psychophysics.experiment.server.messages import Forgotten, Invite, Invited, Observer
@@ -35,6 +36,12 @@ def describe(served: Laboratory) -> dict[str, Any]:
 def list_sessions(served: Laboratory) -> list[SessionState]:
     """Return how far each session is."""
     return session_states(served.engine)
+
+
+@router.get("/scale")
+def scale_so_far(served: Laboratory) -> LiveScale:
+    """Return the scale that the answers so far give, all samples and angles pooled."""
+    return live_scale(served.engine, served.experiment)
 
 
 @router.post("/observers", responses=_UNKNOWN)
