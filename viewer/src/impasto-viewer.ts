@@ -2,8 +2,10 @@
  * The element `<impasto-viewer src="…/painting.zarr">`; docs/publish.md lists its attributes and events.
  */
 
+import { type BasisCase, type BasisOptics, evaluateBasis } from "./gl/basis";
 import { Renderer } from "./gl/renderer";
 import type { Content, Range, Scene, View } from "./gl/scene";
+import { findModel, MODELS, type Model } from "./models";
 import { asProblem, type StoreProblem } from "./store/errors";
 import { type ModelEntry, PublishedStore } from "./store/published";
 import { Annotations } from "./ui/annotations";
@@ -96,6 +98,18 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
 
   get store(): PublishedStore | null {
     return this.#store;
+  }
+
+  /** The models that the shader knows. */
+  get models(): readonly Model[] {
+    return MODELS;
+  }
+
+  /** Basis values of a model as the graphics card computes them: diffuse, and one per lobe, for each case. */
+  basis(model: string, optics: BasisOptics, cases: readonly BasisCase[]): number[][] {
+    const found = findModel(model);
+    if (!found || !this.#renderer) throw new Error(`no model ${model}, or no store yet`);
+    return evaluateBasis(this.#renderer.gl, found, optics, cases);
   }
 
   /** Bytes of tiles on the graphics card. */
@@ -422,7 +436,7 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     if (state.compare) parts.push(...this.#divider());
     if (this.#rule) parts.push(...this.#drawRule(this.#rule));
     this.#notes?.annotations.list.forEach((note, i) => {
-      const [x, y] = this.#toPage(note.x, note.y);
+      const [x, y] = this.toPage(note.x, note.y);
       const mark = h(
         "button",
         { type: "button", class: "note", title: note.text, "aria-label": note.text },
@@ -489,8 +503,8 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
   }
 
   #drawRule(rule: { x1: number; y1: number; x2: number; y2: number }): Element[] {
-    const [x1, y1] = this.#toPage(rule.x1, rule.y1);
-    const [x2, y2] = this.#toPage(rule.x2, rule.y2);
+    const [x1, y1] = this.toPage(rule.x1, rule.y1);
+    const [x2, y2] = this.toPage(rule.x2, rule.y2);
     const pixels = Math.hypot(rule.x2 - rule.x1, rule.y2 - rule.y1);
     const mm = this.#store!.attributes.camera.mm_per_px;
     const text = this.#messages.length(mm ? `${(pixels * mm).toPrecision(4)} mm` : `${pixels.toFixed(0)} px`);
@@ -502,7 +516,8 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
 
   // Places
 
-  #toPicture(x: number, y: number): [number, number] {
+  /** The place in the picture, in its pixels, that lies under a place in the element. */
+  toPicture(x: number, y: number): [number, number] {
     const view = this.#view();
     const ratio = this.#ratio();
     const pane = this.#paneWidth();
@@ -513,7 +528,8 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     ];
   }
 
-  #toPage(x: number, y: number): [number, number] {
+  /** The place in the element under which a place of the picture lies. */
+  toPage(x: number, y: number): [number, number] {
     const view = this.#view();
     const ratio = this.#ratio();
     return [
@@ -539,7 +555,7 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     const { width, height } = this.#store;
     const least = Math.min(this.#paneWidth() / width, this.#canvas.height / height, 1) / 2;
     const scale = clamp(view.scale * factor, least, LARGEST_SCALE);
-    const [px, py] = this.#toPicture(x, y);
+    const [px, py] = this.toPicture(x, y);
     // The place under the pointer stays there.
     const kept = view.scale / scale;
     this.#change({ view: { x: px + (view.x - px) * kept, y: py + (view.y - py) * kept, scale } });
@@ -556,7 +572,7 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
       return true;
     }
     if (this.#tool !== "ruler") return false;
-    const [px, py] = this.#toPicture(x, y);
+    const [px, py] = this.toPicture(x, y);
     this.#rule =
       phase === "start" || !this.#rule
         ? { x1: px, y1: py, x2: px, y2: py }
@@ -569,7 +585,7 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
 
   tap(x: number, y: number): void {
     if (!this.#store) return;
-    const [px, py] = this.#toPicture(x, y).map(Math.floor) as [number, number];
+    const [px, py] = this.toPicture(x, y).map(Math.floor) as [number, number];
     if (px < 0 || py < 0 || px >= this.#store.width || py >= this.#store.height) return;
     if (this.#tool === "annotate") this.#notes!.write(px, py);
     else void this.inspect(px, py);

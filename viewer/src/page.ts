@@ -6,8 +6,7 @@ const WRITE_MS = 250;
 
 const parameters = new URLSearchParams(location.search);
 const viewer = document.createElement("impasto-viewer");
-const language = parameters.get("lang");
-if (language) document.documentElement.lang = viewer.lang = language;
+document.documentElement.lang = viewer.lang = parameters.get("lang") ?? navigator.language;
 viewer.setAttribute("src", parameters.get("src") ?? "painting.zarr");
 if (matchMedia("(max-width: 700px)").matches) viewer.setAttribute("closed", "");
 viewer.hash = location.hash;

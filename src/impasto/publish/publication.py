@@ -24,6 +24,7 @@ from impasto.evaluate.gloss import PixelGloss
 from impasto.evaluate.glossmeter import GLOSSMETERS
 from impasto.fit.pyramid import halve
 from impasto.models import MODELS, parse_model
+from impasto.publish.height import integrate_normals
 from impasto.store import (
     Fit,
     Stack,
@@ -44,6 +45,7 @@ from impasto.store.published import (
     column_attributes,
     encode_chunk,
     encode_shard,
+    linear,
     logarithmic,
     pack,
     parameter_columns,
@@ -64,6 +66,9 @@ _FIT_ATTRIBUTES = (
     "pixels",
     "status_meaning",
 )
+
+_HEIGHT_PX = 2048
+"""Longest side of a relief: its integral takes all of it at once."""
 
 FAST, SMALL = 1, 6
 """How hard gzip tries: for somebody who waits for the chunk, and for a chunk that is kept."""
@@ -155,6 +160,7 @@ class Publication:
             "quantisation": QUANTISATION,
             "models": entries,
             "photographs": self._add_photographs(stack, kept),
+            "height": self._add_height(names[0]),
         }
 
     def documents(self, *, shards: bool = False) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -255,6 +261,31 @@ class Publication:
         self.arrays[path] = PackedArray(
             (height, width, len(columns)), chunk, ("y", "x", "parameter"), 0, read
         )
+
+    def _add_height(self, model: str) -> dict[str, Any]:
+        """Add the relief that a model's normals make, from the finest level that is integrated at once."""
+        sizes = [self.size, *level_sizes(*self.size)]
+        finest = next(level for level, size in enumerate(sizes) if max(size) <= _HEIGHT_PX)
+        fit = open_fit(self.store, model, finest)
+        rows, columns = (slice(0, length) for length in fit.shape)
+        mm_per_px = open_stack(self.store).camera.mm_per_px
+        relief = integrate_normals(fit.read(rows, columns, ["normal"])["normal"])
+        reliefs = [relief * np.float32(2**finest * (mm_per_px or 1))]
+        low, high = float(reliefs[0].min()), float(reliefs[0].max())
+        units = "mm" if mm_per_px else "px"
+        column = linear("height", 0, low, max(high, low + 1e-6), units, "height of the relief")
+        for level in range(finest, self.levels):
+            height, width = sizes[level]
+
+            def read(number: tuple[int, ...], relief: NDArray[Any] = reliefs[-1]) -> Codes:
+                part = relief[_pixels(number[0], len(relief)), _pixels(number[1], relief.shape[1])]
+                return column.encode(part)[..., np.newaxis]
+
+            self.arrays[f"height/{level}"] = PackedArray(
+                (height, width, 1), (PUBLISHED_CHUNK, PUBLISHED_CHUNK, 1), ("y", "x", "parameter"), 0, read
+            )
+            reliefs.append(np.asarray(halve(reliefs[-1])))
+        return {"level": finest, "column": column_attributes([column])[0]}
 
     def _add_photographs(self, stack: Stack, kept: list[int]) -> dict[str, Any] | None:
         if not kept:

@@ -262,8 +262,9 @@ void main() {
   for (int i = 0; i < MAX_SHAPE; i++) shape[i] = given[i];
   Optics optics = Optics(normal.w, light.w > 0.5);
   Basis b = basis(normal.xyz, shape, illumination(light.xyz, view.xyz, optics.index), optics);
-  bits = uvec4(floatBitsToUint(b.diffuse), 0u, 0u, 0u);
-  for (int i = 0; i < MAX_LOBES; i++) bits[i + 1] = floatBitsToUint(b.specular[i]);
+  uvec4 result = uvec4(floatBitsToUint(b.diffuse), 0u, 0u, 0u);
+  for (int i = 0; i < MAX_LOBES; i++) result[i + 1] = floatBitsToUint(b.specular[i]);
+  bits = result;
 }`;
 }
 

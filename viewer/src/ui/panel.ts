@@ -342,6 +342,7 @@ export class Panel {
     const output = h("output");
     const input = h("input", {
       type: "range",
+      "aria-label": label,
       min: low,
       max: high,
       step,
@@ -358,6 +359,8 @@ export class Panel {
 }
 
 function labelled(label: string, control: HTMLElement): HTMLElement {
+  // The options of a list would count as a part of its label's text.
+  control.setAttribute("aria-label", label);
   return h("label", {}, h("span", {}, label), control);
 }
 

@@ -1,0 +1,69 @@
+"""A store with a fit of every model, its maps drawn at random."""
+
+import numpy as np
+
+import impasto
+from impasto.capture.simulate import simulate
+from impasto.models import MODELS
+from impasto.store import MapsWriter, fit_group, fit_maps, level_sizes, open_stack, units
+from impasto.store.hierarchy import coarser_group
+
+SEED = 8
+
+
+def write_every_model(folder, width, height):
+    """Write a store with every model, and return it."""
+    photographs = folder / "photos"
+    simulate(photographs, preset="swatches", lights=4, size=(width, height), calibration=False)
+    store = folder / "every-model.zarr"
+    impasto.stack(photographs, store)
+    channels = open_stack(store).shape[3]
+    for spec in MODELS.values():
+        maps = fit_maps(spec.shape_names, lobes=spec.lobes, ambient=spec.ambient, channels=channels)
+        attributes = {
+            "model": spec.name,
+            "procedure": "joint",
+            "index_of_refraction": 1.45 if spec.name.startswith("gtr") else 1.5,
+            "fresnel": "element" if spec.name.endswith("smith") else "facet",
+            "light_rgb": [1.04, 1.0, 0.96],
+            "status_meaning": {},
+        }
+        sizes = [(height, width), *level_sizes(height, width)]
+        for level, size in enumerate(sizes):
+            group = coarser_group(spec.name, level) if level else fit_group(spec.name)
+            writer = MapsWriter(store, group, maps, *size, attributes)
+            for unit in units(*size):
+                writer.write(unit, _random_maps(spec, maps, unit))
+            writer.finish({})
+    return store
+
+
+def _random_maps(spec, maps, unit):
+    """Return maps with all that a pixel may be: glossy, matte, steep, without a highlight, without a fit."""
+    rng = np.random.default_rng(SEED)
+    size = (unit.height, unit.width)
+
+    def between(low, high, *more):
+        return np.exp(rng.uniform(np.log(low), np.log(high), (*size, *more)))
+
+    values = {map.name: np.full(map.shape(*size), 0.01, map.dtype) for map in maps}
+    slopes = rng.normal(0, 0.25, (*size, 2))
+    normal = np.concatenate([slopes, np.ones((*size, 1))], axis=-1)
+    values["normal"] = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    values["diffuse"] = between(0.01, 0.9, values["diffuse"].shape[2])
+    if spec.lobes:
+        high = 2.0 if spec.name.startswith(("phong", "ward")) else 40.0
+        values["specular"] = between(1e-3, high, *values["specular"].shape[2:])
+    for parameter in spec.shape:
+        values[parameter.name] = between(parameter.lower, parameter.upper)
+    if spec.ambient:
+        values["ambient"] = between(1e-3, 0.1, values["ambient"].shape[2])
+    values["status"][:] = 0
+    drawn = rng.random(size)
+    for name in ("specular", *spec.shape_names):
+        if name in values:
+            values[name][drawn < 0.05] = np.nan
+    for name in values:
+        if name != "status":
+            values[name][drawn < 0.02] = np.nan
+    return {name: np.asarray(values[name], map.dtype) for name, map in ((map.name, map) for map in maps)}

@@ -1,0 +1,130 @@
+"""The page draws what `impasto render` renders from the same published store, for every model."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from tests.every_model import write_every_model
+from tests.viewer_pages import complete, pictures, static_host
+
+import impasto
+from impasto.geometry import Lights, dome_direction
+from impasto.models import MODELS
+
+WIDTH, HEIGHT = 544, 512
+LIGHTS = 20
+GOLDEN = Path(__file__).parent / "golden"
+
+
+@pytest.fixture(scope="module")
+def published(web, tmp_path_factory):
+    """Return a published folder with every model."""
+    folder = tmp_path_factory.mktemp("every-model")
+    impasto.publish(write_every_model(folder, WIDTH, HEIGHT), folder / "site", photographs=4)
+    return folder / "site"
+
+
+@pytest.fixture(scope="module")
+def page(published, browser):
+    """Return a page of the published folder whose canvas has exactly the picture's pixels."""
+    with static_host(published) as url:
+        page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
+        errors = []
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(url)
+        complete(page)
+        yield page
+        page.close()
+        assert errors == []
+
+
+def random_lights(seed):
+    """Return lights all over the hemisphere, every third near, each as the core and as the page take it."""
+    rng = np.random.default_rng(seed)
+    zenith, azimuth = np.degrees(np.arccos(rng.uniform(0.05, 1, LIGHTS))), rng.uniform(0, 360, LIGHTS)
+    intensity = rng.uniform(0.5, 2, LIGHTS)
+    distance = rng.uniform(150, 1500, LIGHTS)
+    direction = dome_direction(np.radians(zenith), np.radians(azimuth))
+    position = np.where((np.arange(LIGHTS) % 3 == 0)[:, None], direction * distance[:, None], np.nan)
+    names = tuple(str(number) for number in range(LIGHTS))
+    lights = Lights(names, direction, position_mm=position, intensity=intensity[:, None])
+    page = [
+        {
+            "zenith": float(zenith[i]),
+            "azimuth": float(azimuth[i]),
+            "distance_mm": None if math.isnan(position[i, 0]) else float(distance[i]),
+            "size_deg": 0,
+            "intensity": float(intensity[i]),
+            "kelvin": 6504,
+        }
+        for i in range(LIGHTS)
+    ]
+    return lights, page
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_page_draws_what_the_core_renders(model, published, page, tmp_path):
+    lights, shown = random_lights(sum(map(ord, model)))
+    # The ambient term is one sum in the shader for all; a few lights tell whether it is there.
+    count = 3 if "ambient" in model else LIGHTS
+    store = published / "painting.zarr"
+    impasto.render(store, model=model, lights=lights.select(slice(0, count)), out=tmp_path, animate=False)
+    view = {"x": WIDTH / 2, "y": HEIGHT / 2, "scale": 1}
+    page.evaluate("hash => { document.querySelector('impasto-viewer').hash = hash }", f"model={model}")
+    complete(page)
+    states = [{"lights": [light], "view": view} for light in shown[:count]]
+    differences = []
+    for number, drawn in enumerate(pictures(page, states)):
+        rendered = np.asarray(Image.open(tmp_path / f"{number}.png")).astype(int)
+        assert rendered.shape == (HEIGHT, WIDTH, 3)
+        differences.append(np.abs(rendered - np.asarray(drawn.convert("RGB"))).max(axis=2))
+        assert rendered.std() > 10  # there is something to compare
+    differences = np.array(differences)
+    assert differences.max() <= 2
+    assert np.mean(differences <= 1) >= 0.999
+    print(f"{model}: {np.mean(differences == 0):.6f} equal, {np.mean(differences <= 1):.6f} within 1")
+
+
+def golden_cases():
+    """Return the golden cases by model and optics."""
+    groups = {}
+    for name in ("hand", "lobes", "mitsuba"):
+        for case in json.loads((GOLDEN / f"{name}.json").read_text())["cases"]:
+            key = (case["model"], case["index"], case["fresnel"])
+            groups.setdefault(key, []).append(case)
+    return groups
+
+
+GROUPS = golden_cases()
+
+
+@pytest.mark.parametrize(("model", "index", "fresnel"), GROUPS)
+def test_the_shader_meets_the_golden_values(model, index, fresnel, page):
+    cases = GROUPS[model, index, fresnel]
+    optics = {"index": index, "element": fresnel == "element"}
+    got = page.evaluate(
+        "([model, optics, cases]) => document.querySelector('impasto-viewer').basis(model, optics, cases)",
+        [model, optics, cases],
+    )
+    got = np.array(got)
+    np.testing.assert_allclose(got[:, 0], [case["diffuse_basis"] for case in cases], rtol=1e-5, atol=1e-6)
+    if MODELS[model].lobes:
+        want = np.array([np.atleast_1d(case["specular_basis"]) for case in cases])
+        # As for the core in single precision: directions rounded to it move a lobe of width c by 1e-7 / c.
+        np.testing.assert_allclose(got[:, 1:], want, rtol=2e-4, atol=1e-6)
+
+
+def test_the_shader_has_every_model_of_the_core(page):
+    """A model that the core lists and the page lacks would not be offered, without a word."""
+    listed = page.evaluate("document.querySelector('impasto-viewer').models")
+    plain = {name: spec for name, spec in MODELS.items() if "ambient" not in name}
+    assert {entry["name"]: (entry["shape"], entry["lobes"]) for entry in listed} == {
+        name: (list(spec.shape_names), spec.lobes) for name, spec in plain.items()
+    }
+    offered = page.evaluate(
+        "document.querySelector('impasto-viewer').store.attributes.models.map(m => m.name)"
+    )
+    assert set(offered) == set(MODELS)
