@@ -98,8 +98,7 @@ def test_all_of_the_light_can_be_set_by_keyboard(open_page):
     page.keyboard.press("Shift+ArrowLeft")
     assert state(page)["lights"][0]["zenith"] == pytest.approx(22)
     assert page.locator(".hemisphere").get_attribute("aria-valuetext") == "zenith 22°, azimuth 0°"
-    page.get_by_label("Intensity").press("ArrowRight")
-    page.wait_for_timeout(100)
+    page.get_by_role("slider", name="Intensity").press("ArrowRight")
     assert state(page)["lights"][0]["intensity"] == pytest.approx(1.05)
     page.get_by_role("button", name="Add a light").press("Enter")
     assert len(state(page)["lights"]) == 2
@@ -187,7 +186,7 @@ def test_models_and_photographs_are_compared(open_page):
     page.get_by_label("Compare", exact=True).select_option("model:phong")
     complete(page)
     assert page.locator(".caption").all_text_contents() == [MODEL, "phong"]
-    handle = page.get_by_label("Swipe line").and_(page.locator("button"))
+    handle = page.get_by_role("button", name="Swipe line")
     x, y = centre(handle)
     drag(page, (x, y), (x + 200, y))
     assert state(page)["swipe"] > 0.6

@@ -57,6 +57,8 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
   #details = h("div");
   #overlay = h("div");
   #problems = h("div");
+  #divider = h("div");
+  #handle = h("button");
   #store: PublishedStore | null = null;
   #renderer: Renderer | null = null;
   #inspector: Inspector | null = null;
@@ -175,7 +177,16 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
       toggle.setAttribute("aria-label", open ? m.hideControls : m.showControls);
     };
     toggle.addEventListener("click", () => show(this.#side.classList.contains("closed")));
-    this.#stage = h("div", { class: "stage" }, this.#canvas, this.#overlay, this.#problems, toggle);
+    this.#divider = this.#newDivider();
+    this.#stage = h(
+      "div",
+      { class: "stage" },
+      this.#canvas,
+      this.#overlay,
+      this.#divider,
+      this.#problems,
+      toggle,
+    );
     const frame = h("div", { class: "frame" }, this.#stage, this.#side);
     this.#root.replaceChildren(frame);
     show(!this.hasAttribute("closed"));
@@ -431,9 +442,10 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     const m = this.#messages;
     const state = this.#state;
     const parts: Element[] = [];
+    this.#divider.hidden = !state.compare;
     if (!this.#ready) parts.push(h("div", { class: "status", role: "status" }, m.loading));
     if (hasLegend(state.show, this.#model())) parts.push(this.#legend());
-    if (state.compare) parts.push(...this.#divider());
+    if (state.compare) parts.push(...this.#captions());
     if (this.#rule) parts.push(...this.#drawRule(this.#rule));
     this.#notes?.annotations.list.forEach((note, i) => {
       const [x, y] = this.toPage(note.x, note.y);
@@ -462,13 +474,12 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     return legend(m.gloss, this.#store!.attributes.white_reference ? m.glossUnits : m.relativeGloss, range);
   }
 
-  #divider(): Element[] {
+  #captions(): Element[] {
     const m = this.#messages;
     const { split, swipe, compare, model } = this.#state;
     const share = split === "swipe" ? swipe : 0.5;
-    const line = h("div", { class: "divider" });
-    line.style.left = `${100 * share}%`;
-    if (split === "swipe") line.append(this.#swipeHandle());
+    this.#divider.style.left = `${100 * share}%`;
+    this.#handle.hidden = split === "side";
     const photograph = this.#photograph();
     let other = compare.slice("model:".length);
     if (photograph !== null) {
@@ -477,14 +488,13 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
       if (compare === "photograph:nearest")
         other += `, ${m.degreesAway(this.#nearestPhotograph().angle_deg)}`;
     }
-    return [line, h("div", { class: "caption" }, model), h("div", { class: "caption right" }, other)];
+    return [h("div", { class: "caption" }, model), h("div", { class: "caption right" }, other)];
   }
 
-  #handle: HTMLButtonElement | null = null;
-
-  #swipeHandle(): HTMLButtonElement {
-    if (this.#handle) return this.#handle;
+  /** The swipe line, which stays where it is in the document, or a drag of it would end. */
+  #newDivider(): HTMLDivElement {
     const handle = h("button", { type: "button", "aria-label": this.#messages.swipe }, "⇔");
+    this.#handle = handle;
     handle.addEventListener("pointerdown", (event) => handle.setPointerCapture(event.pointerId));
     handle.addEventListener("pointermove", (event) => {
       if (!handle.hasPointerCapture(event.pointerId)) return;
@@ -496,10 +506,8 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
       if (step === undefined) return;
       event.preventDefault();
       this.#change({ swipe: clamp(this.#state.swipe + step, 0, 1) });
-      handle.focus();
     });
-    this.#handle = handle;
-    return handle;
+    return h("div", { class: "divider", hidden: true }, handle);
   }
 
   #drawRule(rule: { x1: number; y1: number; x2: number; y2: number }): Element[] {

@@ -339,7 +339,7 @@ export class Panel {
     change: (value: number) => void,
     text: (value: number) => string,
   ): HTMLElement {
-    const output = h("output");
+    const output = h("span", { class: "value", "aria-hidden": "true" });
     const input = h("input", {
       type: "range",
       "aria-label": label,
