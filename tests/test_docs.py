@@ -58,6 +58,7 @@ def test_commands_stand_in_the_order_of_the_pipeline():
         "compare",
         "gonio",
         "gloss",
+        "angles",
         "experiment",
         "observers",
         "scale",

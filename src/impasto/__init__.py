@@ -12,6 +12,7 @@ from impasto.lazy import make_lazy
 
 if TYPE_CHECKING:
     from impasto import calibrate, models
+    from impasto.angles import angles
     from impasto.capture.simulate import simulate
     from impasto.demo import demo
     from impasto.errors import ImpastoError
@@ -41,6 +42,7 @@ __all__ = [
     "FitOptions",
     "ImpastoError",
     "Lights",
+    "angles",
     "calibrate",
     "compare",
     "demo",
@@ -69,6 +71,7 @@ _HOME = {
     "FitOptions": "fit.procedure",
     "ImpastoError": "errors",
     "Lights": "geometry",
+    "angles": "angles",
     "calibrate": "calibrate",
     "compare": "evaluate.compare",
     "demo": "demo",

@@ -20,6 +20,7 @@ COMMANDS = (
     "compare",
     "gonio",
     "gloss",
+    "angles",
     "experiment",
     "observers",
     "scale",
