@@ -10,7 +10,7 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from benchmarks import accuracy, procedures, speed, whole
+from benchmarks import accuracy, angles, procedures, speed, whole
 from benchmarks.photographs import write_capture
 from benchmarks.problem import LIGHTS, light_directions, simulate
 from benchmarks.report import Row, write
@@ -18,6 +18,7 @@ from benchmarks.report import Row, write
 SCIPY_BAR = 800
 WHOLE_BAR = 1.4
 MEMORY_BAR_GB = 1.5
+ANGLES_BAR_S = 120
 # Of a fit of 4 Mpx; larger ones are sampled, and are to take no longer.
 REPORT_BAR_S = 10.0
 # The residual's median is 0.997 for any correct fit; above this the fit does not reach the noise.
@@ -84,6 +85,14 @@ def procedure_rows(folder: Path, side_px: int) -> list[Row]:
     ]
 
 
+def angles_rows(folder: Path, side_px: int, pixels: int) -> list[Row]:
+    """Time the study of which photographs were needed."""
+    measured = angles.measure(folder, side_px, pixels)
+    title = f"angles, {angles.LIGHTS} lights, {pixels:,} pixels, s"
+    what = f"{measured['strategies']:.0f} strategies, {measured['sizes']:.0f} sizes, 40 random sets of each"
+    return [Row(title, measured["seconds"], ANGLES_BAR_S, note=what)]
+
+
 def whole_rows(folder: Path, sizes: list[tuple[int, int]]) -> list[Row]:
     """Time `impasto stack` and `impasto fit`, and their memory, at each size."""
     rows = []
@@ -111,7 +120,7 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="a tenth of the pixels")
     parser.add_argument(
         "--only",
-        choices=["accuracy", "speed", "procedures", "whole"],
+        choices=["accuracy", "speed", "procedures", "angles", "whole"],
         help="one section; prints, writes nothing",
     )
     parser.add_argument("--folder", type=Path, help="where to put the photographs and stores (about 8 GB)")
@@ -124,6 +133,7 @@ def main() -> int:
             "accuracy": ("Accuracy", lambda: accuracy_rows(200_000 // share)),
             "speed": ("Speed", lambda: speed_rows(200_000 // share, 3000 // share, 2)),
             "procedures": ("Procedures", lambda: procedure_rows(folder, 2048 if share == 1 else 320)),
+            "angles": ("Which photographs", lambda: angles_rows(folder, 256, 20_000 // share)),
             "whole": ("From photographs to maps", lambda: whole_rows(folder, sizes)),
         }
         chosen = [arguments.only] if arguments.only else list(sections)
