@@ -11,11 +11,12 @@ from typer.testing import CliRunner
 import impasto
 from impasto.cli import app
 from impasto.errors import OptionError
+from impasto.psychophysics.differences import image_difference, measure_differences
 from impasto.psychophysics.scaling.comparisons import count_choices
 from impasto.psychophysics.scaling.consistency import circular_triads, repeats
 from impasto.psychophysics.scaling.groups import ScaleOptions
 from impasto.psychophysics.scaling.trials import Trial, TrialsError, in_order, read_trials, write_trials
-from impasto.psychophysics.simulated_observers import ObserverModel, image_difference, simulate_observers
+from impasto.psychophysics.simulated_observers import ObserverModel, simulate_observers
 
 runner = CliRunner()
 ANGLES = ("10", "60")
@@ -292,3 +293,23 @@ def test_image_differences():
         image_difference(grey, lighter[:8])
     with pytest.raises(OptionError, match="does not exist"):
         image_difference(grey, lighter, "L2")
+
+
+def test_an_experiment_s_pictures_drive_observers_and_stand_beside_the_scale(painting, tmp_path):
+    folder = tmp_path / "experiment"
+    impasto.experiment.create([painting], out=folder, angles=3)
+    measured = measure_differences(folder)
+    assert set(measured) == {"RMS", "CIEDE2000", "FLIP"}
+    for values in measured.values():
+        photographs = [value for (_, _, condition), value in values.items() if condition == "photograph"]
+        assert photographs == pytest.approx([0, 0, 0], abs=1e-6)
+        assert all(value > 0 for (*_, condition), value in values.items() if condition != "photograph")
+    rendered = {key: value for key, value in measured["CIEDE2000"].items() if key[2] != "photograph"}
+    trials = tmp_path / "trials.csv"
+    gain = 2 / np.ptp(list(rendered.values()))
+    write_trials(trials, simulate_observers(rendered, model=ObserverModel(gain=gain)))
+    result = run("scale", trials, "--errors", folder)
+    assert result.exit_code == 0, result.output
+    found = {error.name: error.predicted for error in impasto.scale(trials, errors=folder).physical}
+    assert set(found) == set(measured)
+    assert found["CIEDE2000"] > 0.55

@@ -61,7 +61,9 @@ def scale(
     ] = None,
     errors: Annotated[
         Path | None,
-        typer.Option("--errors", metavar="FILE", help="Measured differences (CSV), to set beside the scale."),
+        typer.Option(
+            "--errors", metavar="PATH", help="The experiment's folder, or measured differences (CSV)."
+        ),
     ] = None,
     json: Json = None,
     debug: Debug = False,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from impasto.lazy import make_lazy
 
 if TYPE_CHECKING:
+    from impasto.psychophysics.differences import image_difference, measure_differences
     from impasto.psychophysics.planning import next_pairs, observers_needed, stopping_rule
     from impasto.psychophysics.scaling.closed_form import fit_closed_form
     from impasto.psychophysics.scaling.comparisons import Comparisons, count_choices
@@ -20,11 +21,7 @@ if TYPE_CHECKING:
     from impasto.psychophysics.scaling.screening import screen
     from impasto.psychophysics.scaling.ties import fit_ties
     from impasto.psychophysics.scaling.trials import read_trials, write_trials
-    from impasto.psychophysics.simulated_observers import (
-        ObserverModel,
-        image_difference,
-        simulate_observers,
-    )
+    from impasto.psychophysics.simulated_observers import ObserverModel, simulate_observers
 
 __all__ = [
     "Comparisons",
@@ -39,6 +36,7 @@ __all__ = [
     "fit_ties",
     "image_difference",
     "limits",
+    "measure_differences",
     "next_pairs",
     "observers_needed",
     "posterior",
@@ -63,8 +61,9 @@ _HOME = {
     "fit_distance_prior": "scaling.distance_prior",
     "fit_likelihood": "scaling.likelihood",
     "fit_ties": "scaling.ties",
-    "image_difference": "simulated_observers",
+    "image_difference": "differences",
     "limits": "scaling.limits",
+    "measure_differences": "differences",
     "next_pairs": "planning",
     "observers_needed": "planning",
     "posterior": "scaling.posterior",

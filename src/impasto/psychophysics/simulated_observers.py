@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from impasto.errors import OptionError, Problem, raise_problems
 from impasto.psychophysics.scaling.trials import SIMULATED, Trial, in_order
@@ -185,47 +184,3 @@ class Judge:
         if abs(seen) < self.model.indifference:
             return 0
         return 1 if seen > 0 else -1
-
-
-def image_difference(
-    reference: NDArray[np.uint8], picture: NDArray[np.uint8], kind: str = "CIEDE2000"
-) -> float:
-    """Return the mean difference of two pictures as they are shown.
-
-    Parameters
-    ----------
-    reference, picture : ndarray of shape (H, W, 3), uint8, sRGB
-    kind : {"RMS", "CIEDE2000", "FLIP"}, optional
-        Root mean square of the encoded values from 0 to 1; CIE ΔE 2000 [Luo2001]_, mean over the pixels; FLIP
-        [Andersson2020]_, mean over the pixels, at 67 pixels per degree.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    OptionError
-        If there is no such kind, or the pictures differ in size.
-    """
-    if reference.shape != picture.shape:
-        raise OptionError(
-            Problem(
-                "pictures",
-                f"have the sizes {reference.shape} and {picture.shape}",
-                "Give pictures of one size",
-            )
-        )
-    first, second = (image.astype(np.float32) / 255 for image in (reference, picture))
-    if kind == "RMS":
-        return float(np.sqrt(np.mean(np.square(first - second, dtype=np.float64))))
-    if kind == "CIEDE2000":
-        from skimage.color import deltaE_ciede2000, rgb2lab
-
-        return float(np.mean(deltaE_ciede2000(rgb2lab(first), rgb2lab(second))))
-    if kind == "FLIP":
-        from flip_evaluator import evaluate
-
-        _, mean, _ = evaluate(first, second, "LDR")
-        return float(mean)
-    raise OptionError(Problem(f"difference {kind}", "does not exist", "Choose RMS, CIEDE2000 or FLIP"))

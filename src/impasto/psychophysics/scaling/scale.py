@@ -14,7 +14,7 @@ from impasto.psychophysics.scaling.closed_form import ZERO_ONE_RULES
 from impasto.psychophysics.scaling.groups import MODELS, ScaledGroup, ScaleOptions, scale_group
 from impasto.psychophysics.scaling.limits import METHODS
 from impasto.psychophysics.scaling.observers import ObserverReport, report_observers
-from impasto.psychophysics.scaling.physical import PhysicalError, read_errors, relate
+from impasto.psychophysics.scaling.physical import Errors, PhysicalError, read_errors, relate
 from impasto.psychophysics.scaling.trials import Trial, in_order, read_trials
 
 
@@ -82,8 +82,8 @@ def scale(
     exclude : sequence of str, optional
         Observers to leave out; they are named in the result.
     errors : path, optional
-        CSV file with the columns sample, angle and condition and one column per measured difference from the
-        reference, to be compared with the scale.
+        Folder of the experiment, whose pictures are then compared with the photographs, or CSV file with the
+        columns sample, angle and condition and one column per measured difference from the reference.
     out : path, optional
         Folder for figures (PNG) and the scale as a table (CSV).
 
@@ -117,7 +117,7 @@ def scale(
         for trial in everything
         if trial.observer not in exclude and {trial.condition_A, trial.condition_B} <= set(chosen)
     ]
-    measured = read_errors(errors) if errors else None
+    measured = _measured(Path(errors)) if errors else None
     groups = tuple(
         scale_group(name, by, part, chosen, options) for name, by, part in _parts(kept, pools) if part
     )
@@ -142,6 +142,15 @@ def scale(
 
         files = write_figures(prepare_folder(out), summary)
     return ScaleSummary(**{**summary.__dict__, "files": files, "seconds": time.perf_counter() - started})
+
+
+def _measured(path: Path) -> Errors:
+    """Return the differences in a table, or those of an experiment's pictures."""
+    if not path.is_dir():
+        return read_errors(path)
+    from impasto.psychophysics.differences import measure_differences
+
+    return measure_differences(path)
 
 
 def _parts(trials: Sequence[Trial], pools: Mapping[str, Sequence[str]]) -> list[tuple[str, str, list[Trial]]]:
