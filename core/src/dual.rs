@@ -164,6 +164,14 @@ impl<R: Real, const P: usize> Steered<R, P> {
     pub fn parameter(value: R, index: usize, slope: R) -> Self {
         Steered(Dual::parameter(value, index, slope))
     }
+
+    /// The same number as a function of more parameters, of which its own are the first.
+    #[inline(always)]
+    pub fn widened<const Q: usize>(self) -> Steered<R, Q> {
+        let mut wide = Dual::constant(self.0.value);
+        wide.derivative[..P].copy_from_slice(&self.0.derivative);
+        Steered(wide)
+    }
 }
 
 impl<R: Real, const P: usize> Neg for Steered<R, P> {

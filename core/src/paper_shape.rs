@@ -173,9 +173,10 @@ impl<'a, M: Model, const ISA: Isa> ShapeFit<'a, M, ISA> {
 
     #[inline(always)]
     fn quadratic_inline(&self, point: &Tilts<ISA>) -> Quadratic<ISA, 3> {
-        // The models' own directions carry the derivative by the view.
+        // The directions carry the derivative by the view; they depend on nothing else.
         let (sine, cosine) = sine_cosine(point.view);
-        let view = [Steered::parameter(sine, 0, cosine), Steered::splat(0.0), Steered::parameter(cosine, 0, -sine)];
+        let view: [Steered<_, 1>; 3] =
+            [Steered::parameter(sine, 0, cosine), Steered::splat(0.0), Steered::parameter(cosine, 0, -sine)];
         let shape = point.shape_log.exp();
         let shape = Steered::<_, 3>::parameter(shape, 1, shape);
         let (sine, cosine) = sine_cosine(point.phi);
@@ -187,7 +188,10 @@ impl<'a, M: Model, const ISA: Isa> ShapeFit<'a, M, ISA> {
         quadratic.cost = self.constant;
         for (remainder, calibrated) in self.remainders.iter().zip(self.illuminations) {
             let light = array!(|i| Steered(Dual::constant(calibrated.light[i])));
-            let at = Illumination::new(light, view, self.optics.index);
+            let at = Illumination::new(light, view, self.optics.index).map(
+                #[inline(always)]
+                |number| number.widened(),
+            );
             let Steered(lobe) = M::basis(normal, &[shape], &at, &self.optics).specular[0];
             let slopes = lobe.derivative;
             let residual = remainder.value - self.specular * lobe.value;
