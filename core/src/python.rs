@@ -1,5 +1,6 @@
 //! The Python module `impasto._core`: arrays in, arrays out. Nothing else in the crate knows Python.
 
+use crate::correct::{Correction, Grid, Stored};
 use crate::dispatch;
 use crate::geometry::{Illumination, Place};
 use crate::joint::Options;
@@ -360,8 +361,81 @@ fn basis_slopes<'py>(
     Ok(slopes.into_pyarray(py).reshape(shape)?.into_any())
 }
 
+/// Corrects a band of a photograph's codes; see `impasto.stack.corrections`. Returns the band and how many samples are
+/// clipped: they are 65535, or infinite without `per_step`.
+#[pyfunction]
+#[pyo3(signature = (codes, *, row0, height, clip, table=None, dark=None, gain=None, per_step=None))]
+#[allow(clippy::too_many_arguments)]
+fn correct<'py>(
+    py: Python<'py>,
+    codes: PyReadonlyArray3<'py, u16>,
+    row0: usize,
+    height: usize,
+    clip: u32,
+    table: Option<PyReadonlyArray2<'py, f32>>,
+    dark: Option<PyReadonlyArray3<'py, f32>>,
+    gain: Option<PyReadonlyArray3<'py, f32>>,
+    per_step: Option<f32>,
+) -> PyResult<(Bound<'py, PyAny>, usize)> {
+    let &[rows, width, channels] = codes.shape() else { unreachable!("three dimensions") };
+    let table = table.as_ref().map(|table| Ok::<_, PyErr>((table.shape()[0], table.as_slice()?))).transpose()?;
+    if let Some((found, values)) = table {
+        check("table", found, channels)?;
+        if values.is_empty() {
+            return Err(invalid("table is empty"));
+        }
+    }
+    for (name, grid) in [("dark", &dark), ("gain", &gain)] {
+        if let Some(grid) = grid {
+            check(name, grid.shape()[2], channels)?;
+            if grid.len() == 0 {
+                return Err(invalid(format!("{name} is empty")));
+            }
+        }
+    }
+    let with = Correction {
+        height,
+        width,
+        channels,
+        table: table.map(|(_, values)| values),
+        clip,
+        dark: dark.as_ref().map(parse_grid).transpose()?,
+        gain: gain.as_ref().map(parse_grid).transpose()?,
+    };
+    let codes = codes.as_slice()?;
+    fn run<T: Stored + Send + Sync>(
+        py: Python<'_>,
+        codes: &[u16],
+        row0: usize,
+        per_step: f32,
+        with: &Correction,
+        zero: T,
+    ) -> (Vec<T>, usize) {
+        py.detach(|| {
+            let mut out = vec![zero; codes.len()];
+            let clipped = crate::correct::correct(codes, row0, per_step, with, &mut out);
+            (out, clipped)
+        })
+    }
+    let shape = [rows, width, channels];
+    Ok(match per_step {
+        Some(per_step) => {
+            let (out, clipped) = run(py, codes, row0, per_step, &with, 0u16);
+            (out.into_pyarray(py).reshape(shape)?.into_any(), clipped)
+        }
+        None => {
+            let (out, clipped) = run(py, codes, row0, 1.0, &with, 0f32);
+            (out.into_pyarray(py).reshape(shape)?.into_any(), clipped)
+        }
+    })
+}
+
+fn parse_grid<'a>(grid: &'a PyReadonlyArray3<'_, f32>) -> PyResult<Grid<'a>> {
+    Ok(Grid { values: grid.as_slice()?, rows: grid.shape()[0], columns: grid.shape()[1] })
+}
+
 #[pymodule]
 mod _core {
     #[pymodule_export]
-    use super::{available_instructions, basis, basis_slopes, fit, instructions, models, render};
+    use super::{available_instructions, basis, basis_slopes, correct, fit, instructions, models, render};
 }

@@ -73,3 +73,14 @@ def basis_slopes(
     index: float,
     fresnel: str,
 ) -> NDArray[np.float64]: ...
+def correct(
+    codes: NDArray[np.uint16],
+    *,
+    row0: int,
+    height: int,
+    clip: int,
+    table: NDArray[np.float32] | None = None,
+    dark: NDArray[np.float32] | None = None,
+    gain: NDArray[np.float32] | None = None,
+    per_step: float | None = None,
+) -> tuple[NDArray[Any], int]: ...

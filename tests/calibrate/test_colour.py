@@ -17,7 +17,7 @@ TARGET = "ColorChecker24 - After November 2014"
 
 @pytest.fixture(scope="module")
 def spectra():
-    """Return the ColorChecker's spectra, XYZ under D50, and what a Nikon D5100 sees of both, white of mean 1."""
+    """Return what a Nikon D5100 sees of the ColorChecker under D50, white of mean 1, and XYZ."""
     shape = colour.SpectralShape(400, 700, 10)
     patches = colour.SDS_COLOURCHECKERS["ISO 17321-1"]
     reflectance = np.array([sd.copy().align(shape).values for sd in patches.values()])

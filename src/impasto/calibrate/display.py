@@ -192,8 +192,6 @@ def _start(drive: Array, xyz: Array, white: Array, model: str, name: str) -> Add
 
 def _optimise(start: AdditiveDisplay, drive: Array, xyz: Array, white: Array) -> AdditiveDisplay:
     """Return the display with matrix, black and, where they are numbers, curves of least mean CIEDE2000."""
-    gog = isinstance(start.curves, GainOffsetGamma)
-
     def build(values: Array) -> AdditiveDisplay:
         curves = start.curves
         if isinstance(start.curves, GainOffsetGamma):
@@ -214,8 +212,6 @@ def _optimise(start: AdditiveDisplay, drive: Array, xyz: Array, white: Array) ->
         return float(ciede2000(shown, xyz, white).mean())
 
     best = min((first, near), key=mean)
-    fine = minimize(
-        mean, best, method="Powell", options={"maxiter": 6 if gog else 4, "xtol": 1e-5, "ftol": 1e-6}
-    )
+    fine = minimize(mean, best, method="Powell", options={"maxiter": 2, "xtol": 1e-4, "ftol": 1e-5})
     chosen = np.asarray(fine.x) if fine.fun < mean(best) else best
     return build(chosen)

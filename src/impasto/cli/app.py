@@ -133,3 +133,9 @@ def numbers(text: str, count: int, option: str) -> tuple[float, ...]:
         what = f"is not {count} numbers separated by commas"
         raise OptionError(Problem(f"{option} {text}", what, "See --help for what each is"))
     return values
+
+
+def corners(text: str, option: str) -> tuple[int, int, int, int]:
+    """Return a box as first column, first row, end column and end row; errors as for `numbers`."""
+    left, top, right, bottom = (round(number) for number in numbers(text, 4, option))
+    return left, top, right, bottom

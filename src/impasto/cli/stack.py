@@ -25,13 +25,44 @@ def stack(
         list[str] | None,
         typer.Option("--exclude", metavar="NAME", help="Photograph to leave out; may be repeated."),
     ] = None,
+    brackets: Annotated[
+        list[Path] | None,
+        typer.Option("--brackets", metavar="DIR", help="Further exposures, same names; may be repeated."),
+    ] = None,
+    oecf: Annotated[
+        Path | None, typer.Option("--oecf", metavar="FILE", help="The camera's response, calibrated.")
+    ] = None,
+    dark: Annotated[
+        Path | None, typer.Option("--dark", metavar="FILE", help="The dark frame, calibrated.")
+    ] = None,
+    flat: Annotated[
+        Path | None, typer.Option("--flat", metavar="FILE", help="The flat field, calibrated.")
+    ] = None,
+    white: Annotated[
+        Path | None, typer.Option("--white", metavar="FILE", help="The white reference, calibrated.")
+    ] = None,
+    colour: Annotated[
+        Path | None, typer.Option("--colour", metavar="FILE", help="The camera's colours, calibrated.")
+    ] = None,
     overwrite: Overwrite = False,
     json: Json = None,
     debug: Debug = False,
 ) -> None:
     """Read photographs and their lights into a store."""
     with reporting("stack", json, debug) as report:
-        summary = impasto.stack(photos, store, lights=lights, exclude=exclude or (), overwrite=overwrite)
+        summary = impasto.stack(
+            photos,
+            store,
+            lights=lights,
+            exclude=exclude or (),
+            brackets=brackets or (),
+            oecf=oecf,
+            dark=dark,
+            flat=flat,
+            white=white,
+            colour=colour,
+            overwrite=overwrite,
+        )
         report.say_all(stack_lines(summary))
         report.say(f"next: impasto fit {store}")
         report.done(summary)

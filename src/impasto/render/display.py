@@ -9,12 +9,13 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from impasto.calibrate.display import read_display
 from impasto.colour.adaptation import ADAPTATIONS, WHITE_POINTS, Adaptation, xy_to_xyz
 from impasto.colour.camera import CameraColour, camera_colour
 from impasto.colour.displays import Display, display_p3, srgb_display
 from impasto.colour.icc_display import icc_display
 from impasto.colour.rendition import HIGHLIGHT_RULES, HighlightRule, Rendition
-from impasto.errors import OptionError, Problem, raise_problems
+from impasto.errors import CaptureError, OptionError, Problem, raise_problems
 from impasto.store import PublishedStack, Stack
 
 _NAMED = {"srgb": srgb_display, "display-p3": display_p3}
@@ -36,7 +37,7 @@ def requested_rendition(
     ----------
     stack : Stack
     display : str, path or Display
-        ``srgb``, ``display-p3``, or the file of an ICC profile.
+        ``srgb``, ``display-p3``, the file of an ICC profile, or a calibration file of a display.
     exposure : float
         Factor on the radiance.
     white_point : str or (float, float), optional
@@ -96,12 +97,17 @@ def requested_display(display: str | PathLike[str] | Display) -> Display:
     if str(display) in _NAMED:
         return _NAMED[str(display)]()
     path, where = Path(display), f"--display {display}"
+    if path.suffix.lower() == ".json":
+        try:
+            return read_display(path)
+        except CaptureError as error:
+            raise OptionError(error.problems) from error
     try:
         data = path.read_bytes()
     except OSError as error:
         names = ", ".join(_NAMED)
         what = f"is neither a display's name nor a file that can be read: {error.strerror}"
-        raise OptionError(Problem(where, what, f"Choose {names} or an ICC profile")) from error
+        raise OptionError(Problem(where, what, f"Choose {names}, an ICC profile or a calibration file")) from error
     return icc_display(data, where)
 
 

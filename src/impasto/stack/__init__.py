@@ -13,11 +13,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from impasto import store as stores
 from impasto.capture import Capture, Photograph, read_capture
 from impasto.errors import CaptureError, Problem, StoreError, raise_problems
 from impasto.progress import progress
+from impasto.stack.brackets import Exposure, check_times, merge, merged_noise, read_brackets, sample
+from impasto.stack.corrections import Corrections, read_corrections
 from impasto.stack.light_colour import light_colour
 from impasto.stack.linearise import Linearisation, linearisations
 from impasto.stack.samples import Samples
@@ -85,6 +88,12 @@ def stack(
     *,
     lights: str | os.PathLike[str] | None = None,
     exclude: Iterable[str] = (),
+    brackets: Iterable[str | os.PathLike[str]] = (),
+    oecf: str | os.PathLike[str] | None = None,
+    dark: str | os.PathLike[str] | None = None,
+    flat: str | os.PathLike[str] | None = None,
+    white: str | os.PathLike[str] | None = None,
+    colour: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
     memory_bytes: float = 1.2e9,
     show_progress: bool | None = None,
@@ -105,6 +114,10 @@ def stack(
         File with the lights; found in `photos` if there is one.
     exclude : iterable of str, optional
         Names of photographs to leave out.
+    brackets : iterable of path, optional
+        Folders with further exposures of the same names, which are merged with those in `photos`.
+    oecf, dark, flat, white, colour : path, optional
+        Calibration files, as `impasto.calibrate` makes them.
     overwrite : bool, optional
         Whether to replace a stack made from other inputs, and with it the fits that were made from it.
     memory_bytes : float, optional
@@ -119,14 +132,17 @@ def stack(
     Raises
     ------
     CaptureError
-        If photographs or lights cannot be used, listing everything that is wrong.
+        If photographs, lights or calibration files cannot be used, listing everything that is wrong.
     StoreError
         If the store cannot be written, is not one, is from a newer version, or holds something else.
     """
     started = time.perf_counter()
     path = Path(store)
     capture = _read(Path(photos), path, lights, exclude)
-    job = _Job(capture, memory_bytes, show_progress)
+    named = {"oecf": oecf, "dark": dark, "flat": flat, "white": white, "colour": colour}
+    corrections = read_corrections(named, capture)
+    exposures = read_brackets(capture, brackets)
+    job = _Job(capture, corrections, exposures, memory_bytes, show_progress)
     with stores.run(path, "stack") as log:
         fresh, already = _compare(path, job, overwrite)
         kept = len(capture.photographs)
@@ -212,16 +228,31 @@ class _Job:
     Parameters
     ----------
     capture : Capture
+    corrections : Corrections
+    exposures : list of list of Exposure
+        Per light.
     memory_bytes : float
     show_progress : bool or None
     """
 
-    def __init__(self, capture: Capture, memory_bytes: float, show_progress: bool | None) -> None:
+    def __init__(
+        self,
+        capture: Capture,
+        corrections: Corrections,
+        exposures: list[list[Exposure]],
+        memory_bytes: float,
+        show_progress: bool | None,
+    ) -> None:
         self.capture = capture
+        self._corrections = corrections
+        self._exposures = exposures
+        self._notes: dict[int, list[str]] = {}
         self._show = show_progress
-        self._linearisations = linearisations(capture.photographs, capture.clip_level)
-        self.header = _header(capture, self._linearisations)
-        self.decoders = _decoders(capture.photographs, self._linearisations[0], memory_bytes)
+        self._linearisations = linearisations(capture.photographs, capture.clip_level, corrections)
+        self.header = _header(capture, self._linearisations, corrections, exposures)
+        self.decoders = _decoders(
+            capture.photographs, self._linearisations[0], memory_bytes, len(exposures[0])
+        )
         self._samples = Samples(self.header.shape, self.header.dtype)
         self._stop = threading.Event()
 
@@ -238,7 +269,7 @@ class _Job:
         count = len(photographs)
         changed = set()
         with progress("Comparing photographs", count, show=self._show) as advance:
-            for light, future in self._in_parallel(lambda light: self._sha256(photographs[light].path)):
+            for light, future in self._in_parallel(self._sha256_of):
                 advance(1)
                 if found["inputs"][light]["sha256"] not in (future.result(), None):
                     changed.add(photographs[light].name)
@@ -271,8 +302,14 @@ class _Job:
     def _light_colour(self, writer: stores.StackWriter) -> dict[str, Any]:
         """Return what the highlights of the photographs, all written, tell about the light."""
         written = stores.read_group(writer.store / stores.STACK) or {}
+        said = [
+            *self.header.more["notes"],
+            *dict.fromkeys(note for notes in self._notes.values() for note in notes),
+        ]
+        if (reference := self._corrections.light_colour()) is not None:
+            return {**reference, "notes": said}
         colour = light_colour(stores.Stack(writer.store, written), self._samples)
-        notes = [*self.capture.notes, *([colour.note] if colour.note else [])]
+        notes = [*said, *([colour.note] if colour.note else [])]
         return {"light_rgb": list(colour.rgb), "light_rgb_source": colour.source, "notes": notes}
 
     def _in_parallel(self, function: Callable[[int], Result]) -> Iterator[tuple[int, Future[Result]]]:
@@ -289,6 +326,11 @@ class _Job:
                 self._stop.set()
                 pool.shutdown(cancel_futures=True)
                 raise
+
+    def _sha256_of(self, light: int) -> str:
+        """Return the SHA-256 of a photograph, or of those of all its exposures."""
+        sums = [self._sha256(exposure.photograph.path) for exposure in self._exposures[light]]
+        return sums[0] if len(sums) == 1 else hashlib.sha256(" ".join(sums).encode()).hexdigest()
 
     def _sha256(self, path: Path) -> str:
         """Return the SHA-256 of a file in hexadecimal.
@@ -316,37 +358,103 @@ class _Job:
     def _write_one(self, writer: stores.StackWriter, light: int, advance: Callable[[int], None]) -> bool:
         """Write one photograph; return whether it was there already."""
         photograph, linearise = self.capture.photographs[light], self._linearisations[light]
-        sha256 = self._sha256(photograph.path)
+        sha256 = self._sha256_of(light)
         if writer.sha256[light] == sha256:
             advance(photograph.height)
             return True
         writer.start_light(light)
         clipped = 0
-        for row, band in photograph.bands(stores.STACK_CHUNK):
-            self._check_stop()
-            clipped += linearise.clipped_samples(band)
-            stored = linearise(band)
-            self._samples.take(light, row, stored)
-            writer.write_band(light, row, stored)
-            advance(len(band))
+        if len(self._exposures[light]) > 1:
+            clipped = self._write_merged(writer, light, advance)
+        else:
+            for row, band in photograph.bands(stores.STACK_CHUNK):
+                self._check_stop()
+                clipped += linearise.clipped_samples(band)
+                self._store(writer, light, row, linearise(band, row))
+                advance(len(band))
         writer.finish_light(light, sha256, clipped)
         return False
 
+    def _store(self, writer: stores.StackWriter, light: int, row: int, stored: NDArray[Any]) -> None:
+        self._samples.take(light, row, stored)
+        writer.write_band(light, row, stored)
 
-def _header(capture: Capture, decoding: list[Linearisation]) -> stores.StackHeader:
+    def _write_merged(self, writer: stores.StackWriter, light: int, advance: Callable[[int], None]) -> int:
+        """Write the merged exposures of a light; return how many samples are clipped in all of them."""
+        exposures, linearise = self._exposures[light], self._linearisations[light]
+        decoded = []
+        for exposure in exposures:
+            self._check_stop()
+            decoded.append(
+                [(row, np.array(band)) for row, band in exposure.photograph.bands(stores.STACK_CHUNK)]
+            )
+        step = sample([band for _, band in decoded[0]])
+        levels = [
+            np.concatenate([
+                linearise.radiance(band, row)[step, step].reshape(-1) for row, band in bands
+            ])
+            for bands in decoded
+        ]  # fmt: skip
+        times, notes = check_times(exposures, levels)
+        self._notes[light] = notes
+        read, photon = (self.header.noise[name] * self._read_scale for name in ("read", "photon"))
+        beyond = np.float32(max(level for level in self.header.clip_level if level is not None) * 1.01)
+        clipped = 0
+        for number, (row, _) in enumerate(decoded[0]):
+            self._check_stop()
+            parts = [linearise.radiance(bands[number][1], row) for bands in decoded]
+            merged = merge(parts, times, read, photon)
+            lost = np.isposinf(merged)
+            clipped += int(np.count_nonzero(lost))
+            merged[lost] = beyond / np.float32(self.header.scale)
+            self._store(writer, light, row, merged)
+            advance(len(merged))
+        return clipped
+
+    @property
+    def _read_scale(self) -> float:
+        """From the noise of the stack's relative radiance to that of an exposure's full scale."""
+        return self._corrections.white_level * max(exposure.time for exposure in self._exposures[0])
+
+
+def _header(
+    capture: Capture,
+    decoding: list[Linearisation],
+    corrections: Corrections,
+    exposures: list[list[Exposure]],
+) -> stores.StackHeader:
     """Return what the capture says about the stack before anything is decoded."""
     first = capture.photographs[0]
-    kind = first.dtype.name
     clip_level = np.min([each.clip_level for each in decoding], axis=0)
+    scale, dtype = decoding[0].scale, decoding[0].dtype
+    noise = {
+        **_NOISE[first.dtype.name],
+        **(corrections.content("oecf") or {}).get("noise", {}),
+        **capture.noise,
+    }
+    white = corrections.white_level
+    # The variance of radiance that is divided by the white's.
+    noise |= {"read": noise["read"] / white, "photon": noise["photon"] / white}
+    times = [exposure.time for exposure in exposures[0]]
+    if len(times) > 1:
+        noise = merged_noise(noise, times)
+        scale, dtype = 1 / white, np.dtype(np.float32)
+        # What the shortest exposure just shows, wherever a flat field lifts it most.
+        clip_level = np.full(first.channels, corrections.largest_gain / min(times) / white)
+    notes = [*capture.notes]
+    if sentence := corrections.uncalibrated(capture.photographs):
+        notes.append(sentence)
+    if (oecf := corrections.content("oecf")) is not None and oecf["linear"]:
+        notes.append("the camera is linear, as its calibration found: its response is not changed")
     return stores.StackHeader(
         shape=(len(capture.photographs), first.height, first.width, first.channels),
-        dtype=decoding[0].dtype,
+        dtype=dtype,
         lights=capture.lights,
         camera=capture.camera,
-        scale=decoding[0].scale,
+        scale=scale,
         offset=0.0,
         clip_level=tuple(float(level) if np.isfinite(level) else None for level in clip_level),
-        noise={**_NOISE[kind], **capture.noise},
+        noise=noise,
         inputs=[
             {
                 "name": photograph.name,
@@ -361,8 +469,13 @@ def _header(capture: Capture, decoding: list[Linearisation]) -> stores.StackHead
                     for name in ("camera", "lens", "taken")
                     if (value := getattr(photograph, name)) is not None
                 },
+                **(
+                    {"brackets": [[str(one.photograph.path.name), one.time] for one in merged[1:]]}
+                    if len(merged) > 1
+                    else {}
+                ),
             }
-            for photograph in capture.photographs
+            for photograph, merged in zip(capture.photographs, exposures, strict=True)
         ],
         more={
             "quantisation_step": max(each.step for each in decoding),
@@ -370,12 +483,15 @@ def _header(capture: Capture, decoding: list[Linearisation]) -> stores.StackHead
                 "file": capture.light_file.name,
                 "sha256": hashlib.sha256(capture.light_file.read_bytes()).hexdigest(),
             },
-            "notes": list(capture.notes),
+            "notes": notes,
+            **(corrections.attributes() if corrections.files else {}),
         },
     )
 
 
-def _decoders(photographs: Sequence[Photograph], linearisation: Linearisation, memory_bytes: float) -> int:
+def _decoders(
+    photographs: Sequence[Photograph], linearisation: Linearisation, memory_bytes: float, exposures: int = 1
+) -> int:
     """Return how many photographs to decode at a time: as many as there are cores, if memory allows."""
     rows = stores.STACK_CHUNK
     largest = max(
@@ -386,6 +502,8 @@ def _decoders(photographs: Sequence[Photograph], linearisation: Linearisation, m
             (rows + max(rows, photograph.unit_rows)) * photograph.dtype.itemsize
             # the band as stored, its chunks, and the chunks compressed
             + 3 * rows * linearisation.dtype.itemsize
+            # exposures to be merged, all of each, and some bands of floats
+            + (exposures > 1) * exposures * (photograph.height * photograph.dtype.itemsize + 16 * rows)
         )
         # compressed data on their way to the decoder
         + photograph.path.stat().st_size

@@ -11,8 +11,15 @@ from impasto.geometry import zenith_azimuth
 from impasto.summaries.words import Row, count, percent
 
 if TYPE_CHECKING:
+    from impasto.calibrate.colour import Colour
+    from impasto.calibrate.dark import Dark
+    from impasto.calibrate.display import DisplayCalibration
+    from impasto.calibrate.flat import Flat
+    from impasto.calibrate.glare import Glare
     from impasto.calibrate.lights import LightsCalibration
     from impasto.calibrate.oecf import Oecf
+    from impasto.calibrate.steadiness import Steadiness
+    from impasto.calibrate.white import White
 
 
 def lights_table(found: LightsCalibration) -> tuple[Row, list[Row]]:
@@ -66,3 +73,86 @@ def oecf_lines(found: Oecf) -> Iterator[str]:
     yield f"{found.file} is ready; look at {found.plot}"
     if not found.linear:
         yield f"next: impasto stack PHOTOS STORE --oecf {found.file}"
+
+
+def dark_lines(found: Dark) -> Iterator[str]:
+    """Yield what the camera reads without light."""
+    level = ", ".join(percent(value) for value in found.level)
+    yield f"without light the camera reads {level} of full scale, with noise of {percent(found.noise)}"
+    yield f"{count(found.hot, 'hot pixel')}"
+    yield f"{found.file} is ready"
+
+
+def flat_lines(found: Flat) -> Iterator[str]:
+    """Yield how uneven light and lens are, and what is left of it."""
+    cards = f"{len(found.names)} lights" if found.names else "all lights, from one card"
+    yield f"flat field of {cards}: up to {percent(found.before)} off the middle of the frame"
+    yield f"left after correction: {percent(found.after)} (root mean square, largest of all channels)"
+    if found.fall_off:
+        yield "the fall-off of the lights at known positions is taken out: a fit accounts for it"
+    yield from (f"note: {note}" for note in found.notes)
+    yield f"{found.file} is ready; next: impasto stack PHOTOS STORE --flat {found.file}"
+
+
+def white_lines(found: White) -> Iterator[str]:
+    """Yield what a perfect white diffuser reads."""
+    level = ", ".join(f"{value:.4f}" for value in found.radiance)
+    yield f"a perfect white diffuser reads {level} of full scale under a light of intensity 1"
+    rgb = ", ".join(f"{value:.3f}" for value in found.light_rgb)
+    yield f"the light's colour in the camera's space: {rgb}"
+    if found.lights > 1:
+        yield f"{count(found.lights, 'light')} agree within {percent(found.spread)} (standard deviation)"
+    yield f"{found.file} is ready; next: impasto stack PHOTOS STORE --white {found.file}"
+
+
+def colour_table(found: Colour) -> tuple[Row, list[Row]]:
+    """Return header and rows: the errors of each method."""
+    rows: list[Row] = [
+        (
+            name,
+            f"{fit.difference.mean():.2f}",
+            f"{np.percentile(fit.difference, 95):.2f}",
+            f"{fit.left_out.mean():.2f}",
+            f"{np.percentile(fit.left_out, 95):.2f}",
+        )
+        for name, fit in found.fits.items()
+    ]
+    return ("CIEDE2000", "mean", "95th percentile", "mean, left out", "95th, left out"), rows
+
+
+def colour_lines(found: Colour) -> Iterator[str]:
+    """Yield which method is taken, and the worst patch."""
+    fit = found.fits[found.chosen]
+    worst = int(np.argmax(fit.difference))
+    yield f"taken: {found.chosen}; worst patch {found.names[worst]}, {fit.difference[worst]:.2f}"
+    yield f"{found.file} is ready; next: impasto stack PHOTOS STORE --colour {found.file}"
+
+
+def display_lines(found: DisplayCalibration) -> Iterator[str]:
+    """Yield how well the display is described."""
+    difference = found.difference
+    yield (
+        f"{found.model}: CIEDE2000 mean {difference.mean():.2f}, 95th percentile "
+        f"{np.percentile(difference, 95):.2f}, largest {difference.max():.2f} over {len(difference)} colours"
+    )
+    yield f"{found.file} is ready; next: impasto render … --display {found.file}"
+
+
+def steadiness_lines(found: Steadiness) -> Iterator[str]:
+    """Yield by how much the photographs are shifted, and which ones moved."""
+    off = np.hypot(*found.shift_px.T)
+    yield f"{count(len(found.names), 'photograph')}: shifted by {np.median(off):.2f} px in the median"
+    yield f"largest shift: {off.max():.2f} px, {found.names[int(off.argmax())]}"
+    if found.bumped:
+        yield f"note: the camera was bumped before {found.bumped}: all from there on lie elsewhere"
+    elif found.moved:
+        yield f"note: shifted by more than half a pixel: {', '.join(found.moved)}"
+    yield f"{found.file} is ready"
+
+
+def glare_lines(found: Glare) -> Iterator[str]:
+    """Yield how much stray light there is."""
+    share = ", ".join(percent(max(value, 0.0)) for value in found.share)
+    yield f"stray light in the black trap: {share} of the bright surround, per channel"
+    if found.much:
+        yield "note: that lifts dark paints; clean the lens, shade it, and mask what is bright and not needed"

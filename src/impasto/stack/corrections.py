@@ -1,0 +1,204 @@
+"""What calibration files do to photographs as they are stacked: response, dark frame and flat field."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impasto.calibrate.files import Calibration, Subject, read_calibration
+from impasto.calibrate.response import Response
+from impasto.capture import Capture, Photograph
+from impasto.errors import CaptureError, Problem, raise_problems
+
+Named = str | PathLike[str] | None
+
+KINDS = ("oecf", "dark", "flat", "white", "colour")
+_EVERY = "*"
+# What the summary says where a step is left out.
+_LEFT_OUT = {
+    "oecf": "the camera's response: photographs count as their files state",
+    "flat": "uneven light and vignetting",
+    "white": "the absolute scale: albedo, gloss and κ are relative",
+    "colour": "the camera's colours: its channels are shown as sRGB's",
+}
+_RAW_IS_LINEAR = "linear"
+
+
+@dataclass(frozen=True)
+class Corrections:
+    """The calibration files of a stack.
+
+    Parameters
+    ----------
+    files : dict of str to Calibration
+        By kind; those that were given.
+    """
+
+    files: dict[str, Calibration] = field(default_factory=dict)
+
+    def content(self, kind: str) -> dict[str, Any] | None:
+        """Return what a kind of calibration holds, None without one."""
+        return self.files[kind].content if kind in self.files else None
+
+    def table(self, photograph: Photograph) -> NDArray[np.float64] | None:
+        """Return relative radiance of every code, ndarray of shape (codes, C), from the camera's response."""
+        content = self.content("oecf")
+        if content is None or content["linear"]:
+            return None
+        return Response.from_json(content["response"]).table(photograph.dtype)
+
+    def dark(self) -> NDArray[np.float32] | None:
+        """Return the dark frame on a grid, ndarray of shape (rows, columns, C)."""
+        content = self.content("dark")
+        return None if content is None else np.array(content["grid"], np.float32)
+
+    def gain(self, name: str) -> NDArray[np.float32] | None:
+        """Return what a photograph is multiplied with, on a grid, ndarray of shape (rows, columns, C)."""
+        content = self.content("flat")
+        if content is None:
+            return None
+        grids = content["grids"]
+        return (1 / np.array(grids.get(name, grids.get(_EVERY)), np.float64)).astype(np.float32)
+
+    @property
+    def largest_gain(self) -> float:
+        """The largest factor of all flat fields, 1 without."""
+        content = self.content("flat")
+        if content is None:
+            return 1.0
+        return max(1.0, *(float(1 / np.min(grid)) for grid in content["grids"].values()))
+
+    @property
+    def touch_pixels(self) -> bool:
+        """Whether samples are changed, and not just described."""
+        return bool({"dark", "flat"} & self.files.keys())
+
+    def attributes(self) -> dict[str, Any]:
+        """Return the attributes of the stack that follow from the calibration."""
+        more: dict[str, Any] = {
+            "calibration": {
+                kind: {"file": one.path.name, "made_from": one.made_from} for kind, one in self.files.items()
+            }
+        }
+        if (white := self.content("white")) is not None:
+            names = ("radiance", "light_rgb", "reflectance", "normal", "box", "spread", "lights")
+            more["white_reference"] = {name: white[name] for name in names}
+        if (colour := self.content("colour")) is not None:
+            more["camera_colour"] = {
+                "matrix": colour["methods"][colour["chosen"]]["matrix"],
+                "white_xyz": colour["white_xyz"],
+                "source": f"{self.files['colour'].path.name} ({colour['chosen']})",
+            }
+        return more
+
+    @property
+    def white_level(self) -> float:
+        """What a perfect white diffuser reads, mean over the channels, of full scale; 1 if unknown."""
+        white = self.content("white")
+        return 1.0 if white is None else float(np.mean(white["radiance"]))
+
+    def light_colour(self) -> dict[str, Any] | None:
+        """Return the light's colour from the white reference as attributes, None without one."""
+        white = self.content("white")
+        if white is None:
+            return None
+        return {"light_rgb": white["light_rgb"], "light_rgb_source": "white reference"}
+
+    def uncalibrated(self, photographs: Sequence[Photograph]) -> str:
+        """Return in a sentence what is not calibrated, "" if everything is."""
+        raw = all(photograph.transfer == _RAW_IS_LINEAR for photograph in photographs)
+        missing = [
+            text
+            for kind, text in _LEFT_OUT.items()
+            if kind not in self.files and not (kind == "oecf" and raw)
+        ]
+        return f"not calibrated: {'; '.join(missing)}" if missing else ""
+
+
+def read_corrections(named: dict[str, Named], capture: Capture) -> Corrections:
+    """Read calibration files and check that they are for the photographs of a capture.
+
+    Parameters
+    ----------
+    named : dict of str to path or None
+        By kind.
+    capture : Capture
+
+    Raises
+    ------
+    CaptureError
+        Listing every file that cannot be read, or is for another camera, ISO, aperture or size.
+    """
+    problems: list[Problem] = []
+    files = {}
+    for kind, name in named.items():
+        if name is None:
+            continue
+        try:
+            files[kind] = read_calibration(Path(name), kind)
+        except CaptureError as error:
+            problems += error.problems
+            continue
+        problems += _differences(files[kind], capture)
+    corrections = Corrections(files)
+    if (flat := corrections.content("flat")) is not None:
+        problems += _flat_problems(files["flat"], flat, capture)
+    if (oecf := corrections.content("oecf")) is not None:
+        dtype = capture.photographs[0].dtype.name
+        if dtype != oecf["dtype"]:
+            what = f"is for photographs of {oecf['dtype']}, and these have {dtype}"
+            do = "Leave it out, or calibrate with such photographs"
+            problems.append(Problem(files["oecf"].path.name, what, do))
+    if (white := corrections.content("white")) is not None:
+        problems += _exposure_problems(files["white"], white, capture)
+    raise_problems(CaptureError, problems)
+    return corrections
+
+
+def _differences(calibration: Calibration, capture: Capture) -> list[Problem]:
+    """Return a problem for each way in which the photographs are not those that a calibration is for."""
+    problems = {}
+    for photograph in capture.photographs:
+        subject = Subject(
+            photograph.camera, photograph.iso, photograph.f_number,
+            (photograph.width, photograph.height), photograph.channels,
+        )  # fmt: skip
+        for difference in calibration.subject.differences(subject):
+            do = "Calibrate with the settings of these photographs, or leave it out"
+            problems[difference] = Problem(calibration.path.name, f"is for {difference}", do)
+    return list(problems.values())
+
+
+def _flat_problems(file: Calibration, flat: dict[str, Any], capture: Capture) -> list[Problem]:
+    grids = flat["grids"]
+    problems = [
+        Problem(
+            file.path.name,
+            f"holds no flat field for {photograph.name}",
+            "Photograph the card under each light",
+        )
+        for photograph in capture.photographs
+        if photograph.name not in grids and _EVERY not in grids
+    ]
+    if capture.lights.near and not flat["fall_off_taken_out"]:
+        what = (
+            "corrects the fall-off of the lights too, which a fit accounts for as their positions are known"
+        )
+        do = "Make it with --lights FILE, the light file with these positions"
+        problems.append(Problem(file.path.name, what, do))
+    return problems
+
+
+def _exposure_problems(file: Calibration, white: dict[str, Any], capture: Capture) -> list[Problem]:
+    times = {photograph.exposure_s for photograph in capture.photographs}
+    made = white.get("exposure_s")
+    if made is None or len(times) != 1 or None in times or made in times:
+        return []
+    what = f"was made from photographs exposed for {made:g} s, and these were for {times.pop():g} s"
+    return [Problem(file.path.name, what, "Photograph the white reference with the painting's exposure")]
