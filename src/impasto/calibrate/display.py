@@ -192,6 +192,7 @@ def _start(drive: Array, xyz: Array, white: Array, model: str, name: str) -> Add
 
 def _optimise(start: AdditiveDisplay, drive: Array, xyz: Array, white: Array) -> AdditiveDisplay:
     """Return the display with matrix, black and, where they are numbers, curves of least mean CIEDE2000."""
+
     def build(values: Array) -> AdditiveDisplay:
         curves = start.curves
         if isinstance(start.curves, GainOffsetGamma):

@@ -107,7 +107,9 @@ def requested_display(display: str | PathLike[str] | Display) -> Display:
     except OSError as error:
         names = ", ".join(_NAMED)
         what = f"is neither a display's name nor a file that can be read: {error.strerror}"
-        raise OptionError(Problem(where, what, f"Choose {names}, an ICC profile or a calibration file")) from error
+        raise OptionError(
+            Problem(where, what, f"Choose {names}, an ICC profile or a calibration file")
+        ) from error
     return icc_display(data, where)
 
 
