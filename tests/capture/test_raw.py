@@ -84,3 +84,33 @@ def test_simulated_raw_files_go_through_the_pipeline(tmp_path):
     assert attributes["inputs"][0]["camera"] == "impasto simulated camera"
     summary = impasto.fit(store, models=["torrance-sparrow"])
     assert summary.models[0].pixels.get("converged", 0) > 0.5 * 64 * 48
+
+
+def test_half_size_takes_one_pixel_per_four_photosites(tmp_path):
+    """Each colour is that of its own photosites, and a saturated one clips its colour in its pixel alone."""
+    y, x = np.mgrid[:60, :80]
+    image = np.stack([2000 + 300 * x, 3000 + 200 * y, 1000 + 150 * (x + y)], axis=-1).astype(np.uint16)
+    image[20, 30, 0] = 65535
+    write_dng(tmp_path / "half.dng", image)
+    photograph, _ = read_photograph(tmp_path / "half.dng")
+    half = photograph.halved()
+    assert (half.height, half.width) == (30, 40)
+    values = np.concatenate([band for _, band in half.bands(7)])
+    assert [tuple(place) for place in np.argwhere(values == 65535)] == [(10, 15, 0)]
+    green = (image[::2, 1::2, 1].astype(float) + image[1::2, ::2, 1]) / 2
+    np.testing.assert_allclose(values[..., 1], green, atol=6)
+    np.testing.assert_allclose(values[..., 2], image[1::2, 1::2, 2], atol=6)
+
+
+def test_a_stack_at_half_size_has_pixels_twice_as_large(tmp_path):
+    from impasto.capture.simulate import simulate
+
+    photos = tmp_path / "photos"
+    simulate(photos, preset="swatches", size=(48, 40), lights=3, format="dng", calibration=False)
+    impasto.stack(photos, tmp_path / "p.zarr", half_size=True)
+    stack = impasto.open(tmp_path / "p.zarr")["stack"]
+    assert stack["radiance"].shape == (3, 20, 24, 3)
+    assert stack.attrs["camera"]["mm_per_px"] == pytest.approx(2 * 100 / 40)
+    with pytest.raises(CaptureError, match="is no raw file"):
+        simulate(tmp_path / "tiffs", preset="swatches", size=(48, 40), lights=3, calibration=False)
+        impasto.stack(tmp_path / "tiffs", tmp_path / "q.zarr", half_size=True)

@@ -31,6 +31,8 @@ class Header:
         Make and model of the camera, the lens, and the time of the photograph, as the camera noted them.
     orientation : int
         The EXIF orientation, 1 to 8; 1 is upright.
+    half_size : bool
+        Whether a raw file's mosaic is read as one pixel per red, two green and blue photosites.
     remarks : tuple of str
         What is left out on reading, such as an alpha channel.
     """
@@ -49,6 +51,7 @@ class Header:
     lens: str | None = None
     taken: str | None = None
     orientation: int = 1
+    half_size: bool = False
     remarks: tuple[str, ...] = ()
 
 

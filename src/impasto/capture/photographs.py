@@ -47,6 +47,12 @@ class Photograph(Header):
         """The file name without its ending."""
         return self.path.stem
 
+    def halved(self) -> Photograph:
+        """Return the same raw file, to be read at half size."""
+        header = raw.half_size(self)
+        assert isinstance(header, Photograph)  # of the class that it was made from
+        return header
+
     def bands(self, rows: int) -> Iterator[tuple[int, NDArray[Any]]]:
         """Decode the photograph from top to bottom, in bands of `rows` rows.
 

@@ -7,6 +7,7 @@ linearly, so that each value is a weighted mean of photosites of its colour.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -96,7 +97,7 @@ def bands(path: Path, header: Header, rows: int) -> Iterator[tuple[int, NDArray[
         try:
             if raw.raw_pattern is None:
                 raise _no_mosaic("pixels without a mosaic")
-            clipped = _clipped(raw)
+            clipped = _clipped(raw, header.half_size)
             image = raw.postprocess(
                 gamma=(1, 1),
                 no_auto_bright=True,
@@ -104,6 +105,7 @@ def bands(path: Path, header: Header, rows: int) -> Iterator[tuple[int, NDArray[
                 output_color=rawpy.ColorSpace.raw,
                 output_bps=16,
                 demosaic_algorithm=rawpy.DemosaicAlgorithm.LINEAR,
+                half_size=header.half_size,
                 user_flip=0,
                 # LibRaw would take the largest value of each photograph for its white.
                 adjust_maximum_thr=0.0,
@@ -135,18 +137,26 @@ def _no_mosaic(what: str) -> UnreadableError:
     )
 
 
-def _clipped(raw: RawPy) -> NDArray[np.bool_]:
+def half_size(header: Header) -> Header:
+    """Return the header of a raw file that is read at half size, which takes no interpolation."""
+    height, width = ((side + 1) // 2 for side in (header.height, header.width))
+    unit_rows = _WORKING_HEIGHTS * height
+    return replace(header, height=height, width=width, unit_rows=unit_rows, half_size=True)
+
+
+def _clipped(raw: RawPy, half: bool) -> NDArray[np.bool_]:
     """Return which samples have a saturated photosite of their colour among the neighbours they come from."""
     mosaic = raw.raw_image_visible
     saturated = mosaic >= raw.white_level
-    clipped = np.zeros((*mosaic.shape, 3), bool)
+    height, width = ((side + 1) // 2 if half else side for side in mosaic.shape)
+    clipped = np.zeros((height, width, 3), bool)
     if not saturated.any():
         return clipped
     colour = np.minimum(raw.raw_colors_visible, 3)
     for channel in range(3):
         # The second green counts as green.
         sites = saturated & ((colour == channel) | ((colour == 3) & (channel == 1)))
-        clipped[..., channel] = _widened(sites)
+        clipped[..., channel] = _in_cells(sites) if half else _widened(sites)
     return clipped
 
 
@@ -159,6 +169,12 @@ def _widened(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     result[:, 1:] |= wide[:, :-1]
     result[:, :-1] |= wide[:, 1:]
     return result
+
+
+def _in_cells(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which cells of 2 x 2 hold any of a mask."""
+    even = np.pad(mask, [(0, side % 2) for side in mask.shape])
+    return np.asarray(even.reshape(even.shape[0] // 2, 2, even.shape[1] // 2, 2).any(axis=(1, 3)))
 
 
 def _exif(path: Path) -> dict[str, Any]:

@@ -44,6 +44,9 @@ def stack(
     colour: Annotated[
         Path | None, typer.Option("--colour", metavar="FILE", help="The camera's colours, calibrated.")
     ] = None,
+    half_size: Annotated[
+        bool, typer.Option("--half-size", help="Read raw files at half size, which is faster.")
+    ] = False,
     overwrite: Overwrite = False,
     json: Json = None,
     debug: Debug = False,
@@ -61,6 +64,7 @@ def stack(
             flat=flat,
             white=white,
             colour=colour,
+            half_size=half_size,
             overwrite=overwrite,
         )
         report.say_all(stack_lines(summary))

@@ -94,6 +94,7 @@ def stack(
     flat: str | os.PathLike[str] | None = None,
     white: str | os.PathLike[str] | None = None,
     colour: str | os.PathLike[str] | None = None,
+    half_size: bool = False,
     overwrite: bool = False,
     memory_bytes: float = 1.2e9,
     show_progress: bool | None = None,
@@ -118,6 +119,8 @@ def stack(
         Folders with further exposures of the same names, which are merged with those in `photos`.
     oecf, dark, flat, white, colour : path, optional
         Calibration files, as `impasto.calibrate` makes them.
+    half_size : bool, optional
+        Whether raw files are read at half size, which is faster.
     overwrite : bool, optional
         Whether to replace a stack made from other inputs, and with it the fits that were made from it.
     memory_bytes : float, optional
@@ -138,7 +141,7 @@ def stack(
     """
     started = time.perf_counter()
     path = Path(store)
-    capture = _read(Path(photos), path, lights, exclude)
+    capture = _read(Path(photos), path, lights, exclude, half_size)
     named = {"oecf": oecf, "dark": dark, "flat": flat, "white": white, "colour": colour}
     corrections = read_corrections(named, capture)
     exposures = read_brackets(capture, brackets)
@@ -170,12 +173,16 @@ def stack(
 
 
 def _read(
-    photos: Path, store: Path, lights: str | os.PathLike[str] | None, exclude: Iterable[str]
+    photos: Path,
+    store: Path,
+    lights: str | os.PathLike[str] | None,
+    exclude: Iterable[str],
+    half_size: bool,
 ) -> Capture:
     """Read the capture; report its problems and the store's together."""
     problems = stores.target_problems(store)
     try:
-        capture = read_capture(photos, lights, exclude)
+        capture = read_capture(photos, lights, exclude, half_size=half_size)
     except CaptureError as error:
         raise CaptureError([*error.problems, *problems]) from error
     raise_problems(StoreError, problems)

@@ -77,6 +77,7 @@ def read_brackets(capture: Capture, folders: Iterable[str | PathLike[str]]) -> l
                 problems.append(Problem(str(folder), f"holds no exposure of {first.name}", "Add it"))
                 continue
             photograph, _ = read_photograph(found[first.name], first.transfer)
+            photograph = photograph.halved() if first.half_size else photograph
             where = f"{folder.name}/{photograph.path.name}"
             layout = (photograph.height, photograph.width, photograph.channels, photograph.dtype)
             if layout != (first.height, first.width, first.channels, first.dtype):
