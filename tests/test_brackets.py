@@ -15,7 +15,7 @@ from impasto.store import open_stack
 def bracketed(tmp_path_factory):
     """Return a capture of a glossy sample with three shorter exposures."""
     folder = tmp_path_factory.mktemp("brackets") / "photos"
-    simulate(folder, sample="e", size=(96, 80), lights=5, brackets=3, calibration=False)
+    simulate(folder, sample="e", size=(96, 80), lights=5, brackets=3, exposure=1.0, calibration=False)
     return folder
 
 

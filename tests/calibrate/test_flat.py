@@ -169,8 +169,9 @@ def test_a_white_reference_makes_the_stack_absolute(near, lens, tmp_path):
     stated, expected = whole(tmp_path / "stated.zarr")
     assert not stated.absolute
     usable = expected < stated.clip_level
-    gain = stated.lights.intensity[:, None, None, :]
-    ratio = (radiance / (expected / gain))[usable & (expected > 0.01)]
+    gain = np.broadcast_to(stated.lights.intensity[:, None, None, :], expected.shape)
+    usable &= expected > 0.01
+    ratio = radiance[usable] * gain[usable] / expected[usable]
     assert np.median(ratio) == pytest.approx(1, abs=0.01)
 
 
