@@ -57,6 +57,7 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
   #details = h("div");
   #overlay = h("div");
   #problems = h("div");
+  #showSide: (open: boolean) => void = () => {};
   #divider = h("div");
   #handle = h("button");
   #store: PublishedStore | null = null;
@@ -171,12 +172,12 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
       { type: "button", class: "toggle", "aria-expanded": "true", "aria-controls": "side" },
       "☰",
     );
-    const show = (open: boolean) => {
+    this.#showSide = (open) => {
       this.#side.classList.toggle("closed", !open);
       toggle.setAttribute("aria-expanded", String(open));
       toggle.setAttribute("aria-label", open ? m.hideControls : m.showControls);
     };
-    toggle.addEventListener("click", () => show(this.#side.classList.contains("closed")));
+    toggle.addEventListener("click", () => this.#showSide(this.#side.classList.contains("closed")));
     this.#divider = this.#newDivider();
     this.#stage = h(
       "div",
@@ -189,7 +190,7 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     );
     const frame = h("div", { class: "frame" }, this.#stage, this.#side);
     this.#root.replaceChildren(frame);
-    show(!this.hasAttribute("closed"));
+    this.#showSide(!this.hasAttribute("closed"));
     this.#resize.observe(this.#stage);
     this.#resize.observe(this);
     attachGestures(this.#canvas, this);
@@ -595,8 +596,10 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     if (!this.#store) return;
     const [px, py] = this.toPicture(x, y).map(Math.floor) as [number, number];
     if (px < 0 || py < 0 || px >= this.#store.width || py >= this.#store.height) return;
-    if (this.#tool === "annotate") this.#notes!.write(px, py);
-    else void this.inspect(px, py);
+    if (this.#tool === "annotate") {
+      this.#showSide(true);
+      this.#notes!.write(px, py);
+    } else void this.inspect(px, py);
   }
 
   /** Shows the parameters and the curve of a pixel. */
@@ -604,6 +607,7 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     const other = this.#state.compare.startsWith("model:") ? [this.#model(this.#state.compare.slice(6))] : [];
     const { azimuth } = this.#state.lights[this.#state.active]!;
     this.#details.hidden = false;
+    this.#showSide(true);
     this.#details.replaceChildren(this.#messages.loading);
     try {
       const panel = await this.#inspector!.panel([this.#model(), ...other], x, y, azimuth);

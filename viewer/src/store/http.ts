@@ -68,7 +68,13 @@ export class HttpStore implements AsyncReadable {
     this.requests++;
     let response: Response;
     try {
-      response = await fetch(place, { headers, signal: options?.signal ?? null, credentials: "omit" });
+      response = await fetch(place, {
+        headers,
+        signal: options?.signal ?? null,
+        credentials: "omit",
+        // Metadata kept from before the store was published anew would not fit its chunks.
+        cache: key.endsWith("/zarr.json") ? "no-cache" : "default",
+      });
     } catch (error) {
       if (error instanceof Error && error.name === "AbortError") throw error;
       throw new StoreProblem("unreachable", place);
