@@ -144,3 +144,26 @@ def test_the_papers_procedure_has_none(painting):
 def test_a_number_of_components_is_checked(painting):
     with pytest.raises(OptionError, match="expected 1 to"):
         impasto.fit(painting, models=[MODEL], options=FitOptions(residual_components=0))
+
+
+def test_strengths_are_found_that_were_not_stated(painting, tmp_path):
+    """The same photographs, with light 3 said to be a fifth weaker than it was."""
+    import json
+
+    store = fitted(painting, tmp_path, self_calibrate=True)
+    document = store / "stack" / "light_intensity"
+    before = np.array(open_fit(store, MODEL).attributes["self_calibration"]["gain"])
+    stack = open_stack(store)
+    assert json.loads((document / "zarr.json").read_text())["shape"][0] == len(stack.lights)
+    import zarr
+
+    array = zarr.open_array(document, mode="r+")
+    stated = array[...]
+    stated[3] *= 0.8
+    array[...] = stated
+    impasto.fit(store, models=[MODEL], options=FitOptions(self_calibrate=True), overwrite=True)
+    after = np.array(open_fit(store, MODEL).attributes["self_calibration"]["gain"])
+    ratio = (after / before).mean(axis=1)
+    others = np.delete(ratio, 3)
+    assert ratio[3] / np.median(others) == pytest.approx(1.25, rel=0.02)
+    np.testing.assert_allclose(others / np.median(others), 1.0, atol=0.04)

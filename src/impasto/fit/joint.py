@@ -110,7 +110,7 @@ class Joint:
             sample = _SampledPixels(self, sample_pixels(self._stack, self.lights, show_progress))
             toe = usual_toe(sample.measured())
             if self._options.calibrates:
-                calibration = self_calibrate(sample, self._selected, toe)
+                calibration = self_calibrate(sample, self._selected)
                 self._selected = calibration.lights
                 attributes["self_calibration"] = calibration.attributes()
                 notes += _calibration_notes(calibration)
@@ -223,8 +223,7 @@ def _calibration_notes(found: Calibration) -> tuple[str, ...]:
     departure = 100 * np.abs(np.exp(np.log(found.gain / found.trend).mean(axis=1)) - 1)
     return (
         "self-calibration: the strengths of the lights depart from their trend over direction by "
-        f"{_rms(departure):.1f} % (rms), {departure.max():.0f} % at most; directions were turned by "
-        f"{_rms(found.turn_deg):.1f}° (rms), {found.turn_deg.max():.1f}° at most. The attribute "
+        f"{_rms(departure):.1f} % (rms), {departure.max():.0f} % at most. The attribute "
         "self_calibration lists them; --no-self-calibrate takes the lights as stated",
     )
 
