@@ -211,7 +211,7 @@ def angles(
     found = []
     files: list[Path] = []
     for name, refit in refits.items():
-        least = least_lights(refit)
+        least = least_lights(refit.model)
         examined = sorted({*sizes, len(candidates)}) if sizes else usual_sizes(least, len(candidates))
         examined = [size for size in examined if size >= least]
         study = Study(sampled[0], refit, candidates, scored, displayed=allowed.displayed)
@@ -304,12 +304,12 @@ def _too_few(refits: dict[str, Refit], candidates: int) -> list[Problem]:
     return [
         Problem(
             where=f"--model {name}",
-            what=f"needs {least_lights(refit)} photographs, and there are {candidates} to choose from; "
-            f"expected {least_lights(refit) + 1} or more",
+            what=f"needs {least_lights(refit.model)} photographs, and there are {candidates} to choose from; "
+            f"expected {least_lights(refit.model) + 1} or more",
             do="Hold out fewer, take more photographs, or study a model of fewer parameters such as lambert",
         )
         for name, refit in refits.items()
-        if candidates <= least_lights(refit)
+        if candidates <= least_lights(refit.model)
     ]
 
 

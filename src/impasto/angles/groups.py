@@ -71,7 +71,7 @@ def write_groups(
         If the file cannot be written.
     """
     chosen = sorted(set(sizes)) or group_sizes(
-        recommended.size, least_lights(study.refit), len(study.candidates)
+        recommended.size, least_lights(study.refit.model), len(study.candidates)
     )
     serves = next((size for size in chosen if size >= recommended.size), None)
     write_json(

@@ -15,6 +15,7 @@ from impasto.angles.photographed import camera_for
 from impasto.angles.picture import draw_plan
 from impasto.angles.placement import even_lights
 from impasto.angles.search import greedy_exchange
+from impasto.angles.study import least_lights
 from impasto.angles.surfaces import (
     USUAL_GLOSS,
     USUAL_NOISE,
@@ -28,7 +29,6 @@ from impasto.errors import OptionError, Problem, raise_problems
 from impasto.fit import FitOptions, fit_tile
 from impasto.fit.information import noise_variance
 from impasto.geometry import Array, Camera, Lights, arm_direction, dome_direction, tilt_direction
-from impasto.models import parse_model
 from impasto.output import prepare_folder
 from impasto.pixels import Pixels, luminance, pixels_of_maps, render_pixels
 from impasto.render.lights import requested_lights
@@ -259,11 +259,10 @@ def _assumed(gloss: tuple[float, float] | None, relief_deg: float | None) -> Sur
 
 
 def _few(where: str, lights: int, pixels: Pixels) -> list[Problem]:
-    model = parse_model(pixels.attributes["model"])
-    least = 3 + len(model.shape) + model.lobes + int(model.ambient)
+    least = least_lights(pixels.model)
     if lights >= least:
         return []
-    what = f"has {lights} lights, and a fit of {model.name} needs {least}"
+    what = f"has {lights} lights, and a fit of {pixels.model.name} needs {least}"
     return [Problem(where, what, "Plan for more photographs")]
 
 

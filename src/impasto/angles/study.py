@@ -13,6 +13,7 @@ from impasto.angles.placement import even_lights, highlight_density, informed_li
 from impasto.angles.refit import Errors, Refit, Score
 from impasto.angles.search import exhaustive, greedy_exchange
 from impasto.errors import OptionError, Problem
+from impasto.models import ModelSpec
 from impasto.pixels import Pixels
 
 CHOSEN, BEST = "optimal", "exhaustive"
@@ -184,7 +185,6 @@ def usual_sizes(least: int, most: int, count: int = 10) -> list[int]:
     return [int(size) for size in sizes]
 
 
-def least_lights(refit: Refit) -> int:
-    """Return how many lights a fit of the model needs."""
-    model = refit.model
+def least_lights(model: ModelSpec) -> int:
+    """Return how many lights a fit of a model needs."""
     return 2 + len(model.shape) + 1 + model.lobes + int(model.ambient)
