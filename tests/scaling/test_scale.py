@@ -313,3 +313,28 @@ def test_an_experiment_s_pictures_drive_observers_and_stand_beside_the_scale(pai
     found = {error.name: error.predicted for error in impasto.scale(trials, errors=folder).physical}
     assert set(found) == set(measured)
     assert found["CIEDE2000"] > 0.55
+
+
+def test_what_the_experiment_exports_is_read(tmp_path):
+    from impasto.psychophysics.experiment.answers import answers_csv
+
+    common = {"session": 1, "sample": "a", "time": 1.234, "display": "=EIZO, calibrated", "place": 3}
+    common |= {"answered_at": "2026-01-01T10:00:00Z"}
+    rows = [
+        {"observer": "O001", "angle": "-30", "condition_A": "phong", "condition_B": "ward", "side": "left"}
+        | {"choice": "B", "kind": "test"},
+        {"observer": "O001", "angle": "-30", "condition_A": "photograph", "condition_B": "photograph-dimmed"}
+        | {"side": "right", "choice": "A", "kind": "catch"},
+        {"observer": "simulated-002", "angle": "10", "condition_A": "phong", "condition_B": "ward"}
+        | {"side": "right", "choice": "tie", "kind": "test"},
+    ]
+    path = tmp_path / "trials.csv"
+    path.write_text(answers_csv(row | common for row in rows), encoding="utf-8")
+    first, catch, last = read_trials(path)
+    assert (first.angle, first.choice, first.side, first.simulated) == ("-30", -1, "left", False)
+    assert (catch.kind, catch.choice) == ("catch", 1)
+    assert (last.choice, last.simulated) == (0, True)
+    summary = impasto.scale(path)
+    assert summary.groups[0].conditions == ("phong", "ward")
+    assert summary.simulated == 1
+    assert (summary.observers[0].catches, summary.observers[0].caught) == (1, 1)

@@ -130,7 +130,7 @@ def _scales(single: Sequence[ScaledGroup], pooled: Sequence[ScaledGroup], summar
     axes.tick_params(colors=_INK)
     how = ", ".join(sorted({group.limits for group in groups}))
     axes.set_title(
-        f"{UNITS[summary.unit]}, mean 0 · {100 * summary.options.level:g} % limits ({how})",
+        f"{UNITS[summary.unit]}; mean 0\n{100 * summary.options.level:g} % limits ({how})",
         loc="left",
         fontsize=9,
         color=_INK,
