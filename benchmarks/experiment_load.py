@@ -11,6 +11,7 @@ import argparse
 import http.client
 import json
 import random
+import resource
 import tempfile
 import threading
 import time
@@ -99,6 +100,7 @@ def measure(folder: Path, database: str, observers: int, seconds: float) -> dict
     codes = [
         entry.code for entry in invite(experiment, observers=observers, simulated=True, database=database)
     ]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with ServerProcess(experiment, database) as server:
         until = time.monotonic() + seconds
         group = [Observer(server.port, code, until, seed) for seed, code in enumerate(codes)]
@@ -106,6 +108,8 @@ def measure(folder: Path, database: str, observers: int, seconds: float) -> dict
             observer.start()
         for observer in group:
             observer.join()
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    server_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     described = read_experiment(experiment)
     engine = open_database(database_url(database, experiment), described)
     stored = {
@@ -126,6 +130,7 @@ def measure(folder: Path, database: str, observers: int, seconds: float) -> dict
         "seconds": seconds,
         "answers": len(round_trips_ms),
         "answers per second": len(round_trips_ms) / seconds,
+        "server, CPU ms per answer": 1000 * server_s / len(round_trips_ms),
         "lost, doubled or changed": wrong,
         "failed requests": sum(len(observer.failures) for observer in group),
         **{f"p{share} ms": float(np.percentile(round_trips_ms, share)) for share in (50, 95, 99)},
