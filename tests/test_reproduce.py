@@ -15,7 +15,7 @@ from impasto.store import open_fit
 
 @pytest.fixture(scope="module")
 def made(shared, tmp_path_factory):
-    """A matte sample and the one whose highlights cannot be identified."""
+    """A matte sample and one on flat glass."""
     return impasto.reproduce(
         tmp_path_factory.mktemp("reproduce") / "out",
         measured=shared / "reference" / "measured_brdf.npz",

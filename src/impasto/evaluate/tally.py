@@ -168,13 +168,19 @@ class Tally:
 
 
 def specular_ratio(pixels: Pixels) -> Ratio | None:
-    """Return As/Ad of pixels whose diffuse magnitude is above 0; None where there is none, or no lobe."""
-    diffuse = pixels.diffuse.astype(np.float64)
-    lit = (diffuse > 0).all(axis=1)
+    """Return As/Ad of pixels whose diffuse magnitude is above 0; None where there is none, or no lobe.
+
+    A channel in which no pixel reflects has no ratio: NaN.
+    """
+    lit = luminance(pixels.diffuse) > 0
     if not lit.any() or not pixels.model.lobes:
         return None
+    diffuse = pixels.diffuse[lit].astype(np.float64)
     specular = pixels.specular[lit].sum(axis=1, dtype=np.float64)
-    ratio: NDArray[np.float64] = specular / luminance(diffuse[lit])
+    ratio: NDArray[np.float64] = specular / luminance(diffuse)
     low, median, high = np.percentile(ratio, [5, 50, 95]).tolist()
-    per_channel = (specular[:, None] / diffuse[lit]).mean(axis=0)
-    return Ratio(float(ratio.mean()), tuple(per_channel.tolist()), low, median, high)
+    per_channel = tuple(
+        float(np.mean(specular[channel > 0] / channel[channel > 0])) if (channel > 0).any() else float("nan")
+        for channel in diffuse.T
+    )
+    return Ratio(float(ratio.mean()), per_channel, low, median, high)

@@ -67,7 +67,7 @@ class Subject:
 
     @cached_property
     def exposure(self) -> float:
-        """Factor on radiance in pictures: one stop over the brightest 1 % of the diffuse colour as white."""
+        """Factor on radiance in pictures: the 99th percentile of the diffuse magnitude is shown as white."""
         diffuse = self.sample.values(self.models[0], "diffuse")
         finite = diffuse[np.isfinite(diffuse)]
         high = float(np.percentile(finite, 99)) if finite.size else 1.0

@@ -25,8 +25,8 @@ _CANNOT = (
     "interface over a measured base, of the alpha that gives the printed readings of (a) at 20 and 60°. The "
     "83.5 printed for (a) at 85° is out of reach of that alpha.",
     "As for the whole sample rests on one pixel, and with lights in one plane it rests on an assumption "
-    "about that pixel's normal. Where no highlight crosses the plane, as on the flat glass of (c), As and "
-    "the width are not identified and are left out rather than invented.",
+    "about that pixel's normal. Where no highlight crosses the plane, As and the width are not "
+    "identified, and are left out rather than invented.",
     "The figures of the paper are known here by their captions alone; the curves below are the same kind of "
     "curve for our samples.",
     "Networks that stand for measured materials are not used within 10° of grazing, which the 85° gloss asks "

@@ -24,6 +24,7 @@ from impasto.fit import FitOptions, fit
 from impasto.geometry import Array
 from impasto.pixels import luminance
 from impasto.stack import stack
+from impasto.store import open_fit
 
 MODELS = ("torrance-sparrow", "phong")
 # Lamps have a size. Without one, some networks' spikes at the mirror direction, narrower than a degree and
@@ -50,7 +51,7 @@ class FittedSample:
         What Torrance-Sparrow says that a glossmeter reads, its pixels laid flat: their median by angle, gloss
         units.
     curve : Curve or None
-        At the pixel whose highlight has the 99th percentile of the heights.
+        At the pixel that the paper's procedure takes As from: that of the brightest radiance.
     plot : Path or None
     notes : tuple of str
     """
@@ -121,7 +122,8 @@ def enact(
         calibration=False,
         show_progress=show_progress,
     )
-    fitted = {}
+    fitted: dict[str, FittedSample] = {}
+    peak = (0, 0)
     for procedure, (how, options) in PROCEDURES.items():
         store = folder / f"{procedure}.zarr"
         stack(folder / "photos", store, show_progress=show_progress)
@@ -134,29 +136,37 @@ def enact(
             say=said.append,
             show_progress=show_progress,
         )
+        if procedure == "paper":
+            sample = open_fit(store, MODELS[0]).attributes["sample"]
+            peak = (int(sample["column"]), int(sample["row"]))
         fitted[procedure] = _judge(
-            store, folder / f"curves-{procedure}", procedure, tuple(said), show_progress
+            store, folder / f"curves-{procedure}", procedure, peak, tuple(said), show_progress
         )
-    sample = SAMPLES[name]
+    chosen = SAMPLES[name]
+    interface = f" under an interface of alpha {chosen.alpha}" if chosen.interface else ""
     return VirtualSample(
         name=name,
-        material=sample.measured
-        + (f" under an interface of alpha {sample.alpha}" if sample.interface else ""),
-        support=sample.support,
+        material=chosen.measured + interface,
+        support=chosen.support,
         gloss={meter.angle_deg: meter.measure(true_radiance(name, measured)) for meter in GLOSSMETERS},
         fitted=fitted,
     )
 
 
 def _judge(
-    store: Path, curves: Path, procedure: str, notes: tuple[str, ...], show_progress: bool | None
+    store: Path,
+    curves: Path,
+    procedure: str,
+    peak: tuple[int, int],
+    notes: tuple[str, ...],
+    show_progress: bool | None,
 ) -> FittedSample:
     try:
         whole = compare(store, models=MODELS, show_progress=show_progress).regions[0]
     except OptionError:  # no pixel's highlight is identified, as the notes say
         return FittedSample(procedure, {}, {}, None, None, notes)
     readings = gloss(store, model=MODELS[0], show_progress=show_progress).regions[0].readings
-    shown = gonio(store, out=curves, models=MODELS, show_progress=show_progress)
+    shown = gonio(store, out=curves, models=MODELS, pixels=[peak], show_progress=show_progress)
     return FittedSample(
         procedure=procedure,
         models={model.model: model for model in whole.models},

@@ -61,7 +61,7 @@ def _error_table(samples: Mapping[str, VirtualSample]) -> Table:
             for procedure in PROCEDURES:
                 found = sample.fitted[procedure].models.get(model)
                 cells.append(
-                    f"{found.rms:.3g} ({found.rms_highlight:.3g}, {found.rms_elsewhere:.3g})"
+                    f"{found.rms:.3g} ({_error(found.rms_highlight)}, {_error(found.rms_elsewhere)})"
                     if found
                     else _UNKNOWN
                 )
@@ -115,6 +115,10 @@ def _ratio(fitted: FittedSample, model: str) -> str:
     found = fitted.models.get(model)
     ratio = found.ratio if found else None
     return _UNKNOWN if ratio is None else f"{ratio.mean:.4g} ({ratio.low:.3g} – {ratio.high:.3g})"
+
+
+def _error(value: float) -> str:
+    return "no light" if math.isnan(value) else f"{value:.3g}"
 
 
 def _number(value: float) -> str:
