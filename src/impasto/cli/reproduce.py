@@ -10,7 +10,6 @@ import typer
 import impasto
 from impasto.cli.app import Debug, Json, app, pair
 from impasto.console import reporting
-from impasto.reproduce.printed import PRINTED
 from impasto.summaries.words import seconds
 
 
@@ -36,7 +35,7 @@ def reproduce(
         summary = impasto.reproduce(
             out,
             measured=measured,
-            samples=sample or tuple(PRINTED),
+            samples=sample or (),
             size=pair(size, "--size", "Write width and height: --size 64,64"),
             seed=seed,
             say=report.say,

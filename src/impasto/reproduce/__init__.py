@@ -58,7 +58,7 @@ def reproduce(
     out: str | PathLike[str],
     *,
     measured: str | PathLike[str],
-    samples: Sequence[str] = tuple(PRINTED),
+    samples: Sequence[str] = (),
     size: tuple[int, int] = (64, 64),
     seed: int = 0,
     say: Callable[[str], None] = lambda line: None,
@@ -104,6 +104,7 @@ def reproduce(
     """
     started = time.perf_counter()
     folder = Path(out)
+    samples = tuple(dict.fromkeys(samples)) or tuple(PRINTED)
     raise_problems(
         OptionError,
         [
@@ -119,7 +120,7 @@ def reproduce(
         materials.radiance_factor(SAMPLES[name].measured)  # raises for a material that is not there
     prepare_folder(folder)
     enacted = {}
-    for name in dict.fromkeys(samples):
+    for name in samples:
         enacted[name] = enact(
             folder / name, name, materials, size=size, seed=seed, show_progress=show_progress
         )
