@@ -129,6 +129,7 @@ def test_units_and_models(experiment, summary):
     assert odds.groups[0].scale == pytest.approx(z.bradley_terry)
     closed = impasto.scale(experiment, options=ScaleOptions(model="closed-form")).groups[0]
     assert closed.scale == pytest.approx(z.closed_form)
+    assert any("limits those of the likelihood" in note for note in closed.notes)
 
 
 def test_ties_get_a_threshold(tmp_path):

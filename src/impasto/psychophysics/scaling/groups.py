@@ -237,6 +237,8 @@ def scale_comparisons(name: str, by: str, comparisons: Comparisons, options: Sca
             link=options.link,
         )
     notes += found.notes
+    if options.model == "closed-form" and found.method in ("observers", "percentile", "likelihood"):
+        notes.append("the values are those of the closed form, the limits those of the likelihood's scale")
     sided = (
         fit_likelihood(comparisons, link=options.link, position=True) if comparisons.wins_left.any() else None
     )
