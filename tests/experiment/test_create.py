@@ -5,6 +5,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from tests.arm_scenes import make_scene
 
 import impasto
 from impasto.errors import OptionError, OutputError, StoreError
@@ -246,3 +247,19 @@ def test_angles_cover_both_kinds(painting):
     # Where one kind is missing, the other fills up.
     assert len(choose_angles(angles, np.zeros(16), 7)) == 7
     assert len(choose_angles(angles, np.ones(16), 99)) == 16
+
+
+def test_small_groups_on_an_arm_are_fitted_too(tmp_path):
+    """The paper's procedure, by which the store is fitted, would refuse five lights."""
+    store = make_scene(tmp_path / "photos").store
+    impasto.fit(store, models=["torrance-sparrow"], show_progress=False)
+    names = open_stack(store).lights.names
+    content = {"groups": [{"name": "5 angles", "photographs": names[2::8]}], "test_lights": names[1:9:3]}
+    (tmp_path / "groups.json").write_text(json.dumps(content))
+    summary = impasto.experiment.create(
+        [store], out=tmp_path / "e", design="angle-groups", groups=[tmp_path / "groups.json"]
+    )
+    assert summary.conditions == ("5 angles", PHOTOGRAPH)
+    degrees = [float(angle) for angle in summary.angles]
+    assert degrees == sorted(degrees)
+    assert len(degrees) == 3

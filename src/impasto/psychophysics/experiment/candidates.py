@@ -15,6 +15,8 @@ from impasto.store import Fit, Stack, digest, fit_attributes, open_fit
 from impasto.store.borrow import borrowed_stack
 
 USUAL_MODELS = ("torrance-sparrow", "phong")
+_PROCEDURE = "joint"
+"""Of all groups: the paper's needs more photographs without a highlight than small groups have."""
 
 
 class Candidate(Protocol):
@@ -87,31 +89,29 @@ class GroupCandidate:
 
     def made_from(self, sample: str) -> str:
         """Return a digest of what will be fitted, and how."""
-        procedure, options = self._settings(sample)
-        return digest(
-            [self.stacks[sample].sha256, self.model, procedure, options.attributes({}), self.used(sample)]
-        )
+        options = self._options(sample).attributes({})
+        return digest([self.stacks[sample].sha256, self.model, _PROCEDURE, options, self.used(sample)])
 
     @contextmanager
     def opened(self, sample: str) -> Iterator[Fit]:
-        """Fit the group, with the options of the model's fit in the store if there is one."""
-        procedure, options = self._settings(sample)
+        """Fit the group, jointly, with the options of the model's fit in the store if there is one."""
         with borrowed_stack(self.stacks[sample].store) as temporary:
             fit(
                 temporary,
                 models=[self.model],
-                procedure=procedure,
-                options=options,
+                procedure=_PROCEDURE,
+                options=self._options(sample),
                 show_progress=self.show_progress,
             )
             yield open_fit(temporary, self.model)
 
-    def _settings(self, sample: str) -> tuple[str | None, FitOptions]:
+    def _options(self, sample: str) -> FitOptions:
         stack = self.stacks[sample]
         found = fit_attributes(stack.store, self.model)
         options = FitOptions.of(found) if found else FitOptions()
+        of_the_paper = {name: getattr(FitOptions, name) for name in ("refined", "threshold_deg", "highlight")}
         left_out = tuple(name for name in stack.lights.names if name not in self.photographs[sample])
-        return found["procedure"] if found else None, replace(options, exclude=left_out)
+        return replace(options, **of_the_paper, exclude=left_out)
 
 
 def model_candidates(stacks: Mapping[str, Stack], models: Sequence[str]) -> list[ModelCandidate]:
