@@ -5,7 +5,9 @@ docs/store.md specifies the numbers; why they are what they are says docs/decisi
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -141,9 +143,10 @@ class ResidualTerm:
         if not lights or not basis.any():
             return
         table = basis.transpose(1, 0, 2).reshape(self.components, -1).astype(np.float32)
-        # Blocks that stay in the processor's cache.
+        # Blocks that stay in the processor's cache, on all processors.
         rows = max(256, 262144 // (lights * channels + self.components))
-        for first in range(0, pixels, rows):
+
+        def add_to(first: int) -> None:
             part = slice(first, first + rows)
             coefficients = codes[part].astype(np.float32)
             coefficients -= np.float32(ZERO)
@@ -155,3 +158,6 @@ class ResidualTerm:
             result = decode(values, self.toe)
             result *= share
             np.copyto(radiance[:, part], result, where=np.isfinite(radiance[:, part]) & ~dark)
+
+        with ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="residual") as pool:
+            list(pool.map(add_to, range(0, pixels, rows)))
