@@ -10,7 +10,7 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from benchmarks import accuracy, angles, procedures, speed, whole
+from benchmarks import accuracy, angles, procedures, speed, viewer, whole
 from benchmarks.photographs import write_capture
 from benchmarks.problem import LIGHTS, light_directions, simulate
 from benchmarks.report import Row, write
@@ -23,6 +23,9 @@ ANGLES_BAR_S = 120
 REPORT_BAR_S = 10.0
 # The residual's median is 0.997 for any correct fit; above this the fit does not reach the noise.
 RESIDUAL_SLACK = 1.005
+PAGE_BAR_S = 1.5
+PAGE_BAR_REQUESTS = 60
+PAGE_BAR_MB = 600
 
 
 def accuracy_rows(pixels: int) -> list[Row]:
@@ -114,13 +117,27 @@ def whole_rows(folder: Path, sizes: list[tuple[int, int]]) -> list[Row]:
     return rows
 
 
+def viewer_rows(folder: Path, panning_s: float) -> list[Row]:
+    """Open the page of a large painting, and pan it."""
+    measured = viewer.measure(folder, panning_s)
+    height, width = viewer.SIZE
+    title = f"page of {width:,} × {height:,} px"
+    whole = f"all of the view after {measured['whole_s']:.2f} s"
+    empty = f"an empty browser takes {measured['empty_browser_mb']:.0f} MB more"
+    return [
+        Row(f"{title}: first picture, s", measured["first_s"], PAGE_BAR_S, note=whole),
+        Row(f"{title}: requests for it", measured["requests"], PAGE_BAR_REQUESTS),
+        Row(f"{title}: memory while panning, MB", measured["memory_mb"], PAGE_BAR_MB, note=empty),
+    ]
+
+
 def main() -> int:
     """Run the sections asked for and return how many figures miss their bar."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="a tenth of the pixels")
     parser.add_argument(
         "--only",
-        choices=["accuracy", "speed", "procedures", "angles", "whole"],
+        choices=["accuracy", "speed", "procedures", "angles", "whole", "viewer"],
         help="one section; prints, writes nothing",
     )
     parser.add_argument("--folder", type=Path, help="where to put the photographs and stores (about 8 GB)")
@@ -135,6 +152,7 @@ def main() -> int:
             "procedures": ("Procedures", lambda: procedure_rows(folder, 2048 if share == 1 else 320)),
             "angles": ("Which photographs", lambda: angles_rows(folder, 256, 20_000 // share)),
             "whole": ("From photographs to maps", lambda: whole_rows(folder, sizes)),
+            "viewer": ("The page", lambda: viewer_rows(folder / "page", 120 / share)),
         }
         chosen = [arguments.only] if arguments.only else list(sections)
         rows = {}

@@ -10,10 +10,10 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from PIL import Image
 
 READY = """
-new Promise((resolve, reject) => {
+seconds => new Promise((resolve, reject) => {
   const viewer = document.querySelector("impasto-viewer");
   const look = () => viewer.complete ? resolve() : setTimeout(look, 20);
-  setTimeout(() => reject(new Error("the picture is not complete")), 30000);
+  setTimeout(() => reject(new Error("the picture is not complete")), 1000 * seconds);
   look();
 })
 """
@@ -36,9 +36,9 @@ def static_host(folder, handler=_Quiet):
         server.server_close()
 
 
-def complete(page):
+def complete(page, seconds=60):
     """Wait until all tiles of the present view are drawn."""
-    page.evaluate(READY)
+    page.evaluate(READY, seconds)
 
 
 _PICTURES = """

@@ -27,8 +27,8 @@ export type { Light, State } from "./ui/state";
 
 /** Events of the element, by name, with what they tell. */
 export interface ImpastoViewerEvents {
-  /** The first picture is there. */
-  "impasto-ready": CustomEvent<{ requests: number; milliseconds: number }>;
+  /** All of the first view is drawn; `first` says when there was something to look at, if only coarse. */
+  "impasto-ready": CustomEvent<{ requests: number; milliseconds: number; first: number }>;
   /** The view, the light or what is shown has changed. */
   "impasto-change": CustomEvent<{ state: State; hash: string }>;
   "impasto-problem": CustomEvent<{ kind: string; where: string; detail: string }>;
@@ -75,6 +75,7 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
   #changed = 0;
   #ready = false;
   #started = 0;
+  #first = 0;
   #resize = new ResizeObserver(() => this.#fitCanvas());
 
   /** What is shown; set it to change that. */
@@ -152,6 +153,7 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     this.#opening = new AbortController();
     const { signal } = this.#opening;
     this.#started = performance.now();
+    this.#first = 0;
     try {
       const store = await PublishedStore.open(new URL(src, document.baseURI), signal);
       if (!signal.aborted) this.#begin(store);
@@ -424,11 +426,12 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
   #drawNow(): void {
     const scene = this.#scene();
     const complete = this.#renderer!.draw(scene);
+    if (!this.#first && this.cacheBytes) this.#first = performance.now() - this.#started;
     if (complete && !this.#ready) {
       this.#ready = true;
       this.#drawOverlay();
       const milliseconds = performance.now() - this.#started;
-      const detail = { requests: this.#store!.http.requests, milliseconds };
+      const detail = { requests: this.#store!.http.requests, milliseconds, first: this.#first };
       this.dispatchEvent(new CustomEvent("impasto-ready", { detail, bubbles: true, composed: true }));
     }
     // Once more, smoothly, when nothing has changed for a while.
