@@ -210,7 +210,16 @@ def plan(
     camera = Camera(view)
     clip = np.full(surface.pixels.diffuse.shape[1], np.inf)
     expected = expect(surface.pixels, places, camera_for(places, camera), USUAL_NOISE, clip)
-    chosen = greedy_exchange(expected.criterion, lights)
+    # Fits may go astray from lights that are all near the highlights: the outermost lead them back.
+    low = even_lights(places.direction, 2)
+    plans = {
+        greedy_exchange(expected.criterion, lights),
+        tuple(sorted({*greedy_exchange(expected.criterion, lights - 2), *low})),
+    }
+    chosen = min(
+        sorted(each for each in plans if len(each) == lights),
+        key=lambda each: _simulated_rms(surface.pixels, places, each, camera),
+    )
     even = even_lights(places.direction, lights)
     names = tuple(f"light-{number:03d}" for number in range(1, lights + 1))
     found = Lights(names, places.direction[_in_order(places, chosen, kind)])
