@@ -32,7 +32,8 @@ impl Stored for u16 {
     const CLIPPED: u16 = u16::MAX;
 
     fn from_radiance(radiance: f32, per_step: f32) -> u16 {
-        (radiance * per_step + 0.5).clamp(0.0, (u16::MAX - 1) as f32) as u16
+        // By way of a signed integer, which processors convert floats to directly.
+        (radiance * per_step + 0.5).clamp(0.0, (u16::MAX - 1) as f32) as i32 as u16
     }
 }
 
@@ -44,20 +45,43 @@ impl Stored for f32 {
     }
 }
 
-impl Grid<'_> {
+/// A grid spread over rows of pixels, one after the other.
+struct Lines<'a, 'b> {
+    grid: &'a Grid<'b>,
+    /// Of each column of pixels: the node before it, and how far it lies on the way to the next.
+    places: Vec<(usize, f32)>,
+    /// The two rows of nodes about the latest row of pixels, spread over its pixels.
+    upper: Vec<f32>,
+    lower: Vec<f32>,
+    nodes: Option<usize>,
+}
+
+impl<'a, 'b> Lines<'a, 'b> {
+    fn new(grid: &'a Grid<'b>, with: &Correction) -> Self {
+        let places = (0..with.width).map(|column| place(column, with.width, grid.columns)).collect();
+        let length = with.width * with.channels;
+        Lines { grid, places, upper: vec![0.0; length], lower: vec![0.0; length], nodes: None }
+    }
+
     /// Fills `line` with the values of a row of pixels, interpolated linearly both ways.
-    fn row(&self, row: usize, height: usize, width: usize, channels: usize, line: &mut [f32]) {
-        let stride = self.columns * channels;
-        let (upper, down) = place(row, height, self.rows);
-        let node = |column: usize, channel: usize| {
-            let at = upper * stride + column * channels + channel;
-            let below = if upper + 1 < self.rows { at + stride } else { at };
-            self.values[at] + down * (self.values[below] - self.values[at])
-        };
-        let nodes: Vec<f32> =
-            (0..self.columns).flat_map(|column| (0..channels).map(move |channel| node(column, channel))).collect();
-        for (column, pixel) in line.chunks_exact_mut(channels).enumerate() {
-            let (left, across) = place(column, width, self.columns);
+    fn row(&mut self, row: usize, with: &Correction, line: &mut [f32]) {
+        let (nodes, down) = place(row, with.height, self.grid.rows);
+        if self.nodes != Some(nodes) {
+            self.grid.spread(nodes, &self.places, with.channels, &mut self.upper);
+            self.grid.spread((nodes + 1).min(self.grid.rows - 1), &self.places, with.channels, &mut self.lower);
+            self.nodes = Some(nodes);
+        }
+        for ((value, upper), lower) in line.iter_mut().zip(&self.upper).zip(&self.lower) {
+            *value = upper + down * (lower - upper);
+        }
+    }
+}
+
+impl Grid<'_> {
+    /// Spreads a row of nodes over a row of pixels.
+    fn spread(&self, row: usize, places: &[(usize, f32)], channels: usize, line: &mut [f32]) {
+        let nodes = &self.values[row * self.columns * channels..][..self.columns * channels];
+        for (pixel, &(left, across)) in line.chunks_exact_mut(channels).zip(places) {
             let right = (left + 1).min(self.columns - 1);
             for channel in 0..channels {
                 let from = nodes[left * channels + channel];
@@ -77,34 +101,37 @@ fn place(pixel: usize, pixels: usize, nodes: usize) -> (usize, f32) {
 /// Corrects a band of rows that begins at `row0`; returns how many samples are clipped.
 pub fn correct<T: Stored>(codes: &[u16], row0: usize, per_step: f32, with: &Correction, out: &mut [T]) -> usize {
     let length = with.width * with.channels;
-    let mut dark = vec![0.0; length];
-    let mut gain = vec![1.0; length];
+    let (mut dark, mut gain, mut radiance) = (vec![0.0; length], vec![1.0; length], vec![0.0; length]);
+    let mut dark_lines = with.dark.as_ref().map(|grid| Lines::new(grid, with));
+    let mut gain_lines = with.gain.as_ref().map(|grid| Lines::new(grid, with));
     let entries = with.table.map_or(0, |table| table.len() / with.channels);
     let clip = with.clip.min(1 << 16);
     let mut clipped = 0;
+    // Each loop does one thing, so that the compiler can make vectors of it.
     for (number, (line, stored)) in codes.chunks_exact(length).zip(out.chunks_exact_mut(length)).enumerate() {
-        if let Some(grid) = &with.dark {
-            grid.row(row0 + number, with.height, with.width, with.channels, &mut dark);
+        if let Some(lines) = &mut dark_lines {
+            lines.row(row0 + number, with, &mut dark);
         }
-        if let Some(grid) = &with.gain {
-            grid.row(row0 + number, with.height, with.width, with.channels, &mut gain);
+        if let Some(lines) = &mut gain_lines {
+            lines.row(row0 + number, with, &mut gain);
         }
-        let store = |code: u16, radiance: f32, at: usize| {
-            if code as u32 >= clip { T::CLIPPED } else { T::from_radiance((radiance - dark[at]) * gain[at], per_step) }
-        };
         match with.table {
             Some(table) => {
-                for at in 0..length {
-                    let code = line[at];
-                    let entry = (code as usize).min(entries - 1);
-                    stored[at] = store(code, table[at % with.channels * entries + entry], at);
+                for (codes, pixel) in line.chunks_exact(with.channels).zip(radiance.chunks_exact_mut(with.channels)) {
+                    for channel in 0..with.channels {
+                        pixel[channel] = table[channel * entries + (codes[channel] as usize).min(entries - 1)];
+                    }
                 }
             }
             None => {
-                for at in 0..length {
-                    stored[at] = store(line[at], line[at] as f32 * (1.0 / 65535.0), at);
+                for (value, &code) in radiance.iter_mut().zip(line) {
+                    *value = code as f32 * (1.0 / 65535.0);
                 }
             }
+        }
+        for at in 0..length {
+            let value = T::from_radiance((radiance[at] - dark[at]) * gain[at], per_step);
+            stored[at] = if line[at] as u32 >= clip { T::CLIPPED } else { value };
         }
         clipped += line.iter().filter(|&&code| code as u32 >= clip).count();
     }
