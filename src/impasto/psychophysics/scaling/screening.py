@@ -72,6 +72,8 @@ def screen(groups: Sequence[Comparisons]) -> tuple[Screened, ...]:
         choices = group.wins
         everyone = choices.sum(axis=0)
         start = fit_distance_prior(everyone) if len(components(everyone + everyone.T > 0)) == 1 else None
+        # Many observers leave the same table behind, above all where there are two conditions.
+        scales: dict[bytes, NDArray[np.float64]] = {}
         for number, own in enumerate(choices):
             others = everyone - own
             first, second = np.nonzero(np.triu(own + own.T))
@@ -80,7 +82,10 @@ def screen(groups: Sequence[Comparisons]) -> tuple[Screened, ...]:
             if len(components(others + others.T > 0)) > 1:
                 total[number] = np.nan
                 continue
-            scale = fit_distance_prior(others, start)
+            key = others.tobytes()
+            if key not in scales:
+                scales[key] = fit_distance_prior(others, start)
+            scale = scales[key]
             distance = scale[first] - scale[second]
             chosen, refused = own[first, second], own[second, first]
             straight = binom.logpmf(chosen, chosen + refused, np.exp(log_ndtr(distance)))
