@@ -35,6 +35,8 @@ class PublishSummary:
         The folder.
     models : tuple of str
         The models, in the order in which the page offers them.
+    without_residual : tuple of str
+        Those of them that have a residual term in the store, which is not published.
     photographs : int
         How many photographs are there for comparison.
     size : (int, int)
@@ -52,6 +54,7 @@ class PublishSummary:
 
     out: Path
     models: tuple[str, ...]
+    without_residual: tuple[str, ...]
     photographs: int
     size: tuple[int, int]
     levels: int
@@ -144,6 +147,7 @@ def publish(
     return PublishSummary(
         out=folder,
         models=tuple(entry["name"] for entry in publication.attributes["models"]),
+        without_residual=tuple(publication.without_residual),
         photographs=len(kept["lights"]) if kept else 0,
         size=(width, height),
         levels=publication.levels,

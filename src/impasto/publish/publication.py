@@ -144,6 +144,7 @@ class Publication:
         self.size = (stack.shape[1], stack.shape[2])
         self.levels = 1 + len(level_sizes(*self.size))
         self.arrays: dict[str, PackedArray] = {}
+        self.without_residual: list[str] = []
         entries = [self._add_model(name) for name in names]
         kept = _spread(stack.lights.direction, photographs)
         self.attributes: dict[str, Any] = {
@@ -221,6 +222,8 @@ class Publication:
         spec = parse_model(name)
         fits = [open_fit(self.store, name, level) for level in range(self.levels)]
         there = fits[0].names
+        if "residual" in fits[0].attributes:
+            self.without_residual.append(name)
         wanted = ["normal", "diffuse", *(["specular"] if spec.lobes else []), *spec.shape_names]
         wanted += [extra for extra in ("ambient", "view_tilt") if extra in there]
         parameters = parameter_columns(fits[0], wanted)

@@ -17,6 +17,9 @@ def publish_lines(summary: PublishSummary) -> Iterator[str]:
     models = ", ".join(summary.models)
     yield f"{models} at {width} x {height} pixels and {count(summary.levels - 1, 'coarser size')}"
     yield f"{summary.out}: {count(summary.files, 'file')}, {summary.bytes / 1e6:.1f} MB"
+    if summary.without_residual:
+        names = ", ".join(summary.without_residual)
+        yield f"without the residual term of {names}, which the page does not draw"
     if summary.photographs:
         yield f"{count(summary.photographs, 'photograph')} to compare with"
     yield (
