@@ -7,7 +7,7 @@ matter. Directions are unit vectors of shape (..., 3) that point away from the s
 References
 ----------
 [Chen2007], [TorranceSparrow1967], [Blinn1977], [TrowbridgeReitz1975], [Heitz2014], [Burley2012], [Ward1992],
-and [Born1999], section 1.5; in full in docs/references.md.
+[OrenNayar1994], and [Born1999], section 1.5; in full in docs/references.md.
 """
 
 from __future__ import annotations
@@ -17,12 +17,29 @@ import numpy as np
 # Name: (names of the shape parameters, facet distribution, geometric attenuation).
 MODELS = {
     "lambert": ((), None, None),
+    "oren-nayar": (("sigma",), None, None),
     "phong": (("shininess",), None, None),
     "torrance-sparrow": (("c",), "trowbridge-reitz", "v-groove"),
     "torrance-sparrow-gaussian": (("m",), "gaussian", "v-groove"),
     "torrance-sparrow-smith": (("c",), "trowbridge-reitz", "smith"),
+    "torrance-sparrow-2": (("c", "c2"), "trowbridge-reitz", "v-groove"),
     "gtr": (("c", "exponent"), "generalised-trowbridge-reitz", "v-groove"),
     "ward": (("alpha",), None, None),
+    "ward-anisotropic": (("alpha_x", "alpha_y", "correlation"), None, None),
+}
+
+# A shape that every test of fitting and of physics can use.
+TYPICAL = {
+    "c": 0.25,
+    "c2": 0.7,
+    "m": 0.25,
+    "shininess": 30.0,
+    "alpha": 0.25,
+    "alpha_x": 0.2,
+    "alpha_y": 0.3,
+    "correlation": 0.4,
+    "exponent": 1.6,
+    "sigma": 0.5,
 }
 
 
@@ -49,6 +66,42 @@ def trowbridge_reitz(n_h, c):
 def generalised_trowbridge_reitz(n_h, c, exponent):
     """D = [c² / ((n·h)² (c² − 1) + 1)]^exponent ([Burley2012])."""
     return (c**2 / (n_h**2 * (c**2 - 1) + 1)) ** exponent
+
+
+def bivariate_gaussian(x, y, alpha_x, alpha_y, correlation):
+    """exp(−s Σ⁻¹ s / 2) of slopes s = (x, y), with Σ = [[αx², ρ αx αy], [ρ αx αy, αy²]]/2 ([Heitz2014])."""
+    covariance = np.stack(
+        [
+            np.stack([alpha_x**2, correlation * alpha_x * alpha_y], -1),
+            np.stack([correlation * alpha_x * alpha_y, alpha_y**2], -1),
+        ],
+        -2,
+    )
+    slope = np.stack(np.broadcast_arrays(x, y), -1)[..., None]
+    return np.exp(-np.sum(slope * (np.linalg.inv(covariance / 2) @ slope), axis=(-2, -1)) / 2)
+
+
+def turned_axes(normal):
+    """Return X and Y turned by the shortest rotation from Z to the normal."""
+    axis = np.cross([0.0, 0.0, 1.0], normal)
+    cosine = normal[..., 2:]
+
+    def turn(a):
+        along = np.sum(axis * a, axis=-1, keepdims=True)
+        return a * cosine + np.cross(axis, a) + axis * along / (1 + cosine)
+
+    return turn(np.array([1.0, 0.0, 0.0])), turn(np.array([0.0, 1.0, 0.0]))
+
+
+def oren_nayar(n_l, n_v, l_v, sigma):
+    """A + B max(0, cos φ) sin α tan β from the angles themselves ([OrenNayar1994] Eq. 30)."""
+    theta_l, theta_v = np.arccos(np.clip(n_l, -1, 1)), np.arccos(np.clip(n_v, -1, 1))
+    sines = np.sin(theta_l) * np.sin(theta_v)
+    cos_phi = np.where(sines > 0, (l_v - n_l * n_v) / np.where(sines > 0, sines, 1), 0)
+    a = 1 - 0.5 * sigma**2 / (sigma**2 + 0.33)
+    b = 0.45 * sigma**2 / (sigma**2 + 0.09)
+    larger, smaller = np.maximum(theta_l, theta_v), np.minimum(theta_l, theta_v)
+    return a + b * np.maximum(0, cos_phi) * np.sin(larger) * np.tan(smaller)
 
 
 def gaussian(n_h, m):
@@ -96,9 +149,11 @@ def basis(model, shape, normal, light, view, *, index=1.5, fresnel="facet"):
 
     Returns
     -------
-    diffuse, specular : ndarray of shape (...)
-        max(0, n·l), and max(0, r·v)^shininess [Chen2007] Eq. 1, D F G/(n·v) [Chen2007] Eq. 2 or
-        √(n·l/n·v) exp(−tan² δ/alpha²) [Ward1992] (zero for `lambert`); both zero where n·l ≤ 0 or n·v ≤ 0.
+    diffuse : ndarray of shape (...)
+        max(0, n·l), times `oren_nayar` for that model; zero where n·l ≤ 0 or n·v ≤ 0.
+    specular : ndarray of shape (...), or (..., 2) for two lobes
+        max(0, r·v)^shininess [Chen2007] Eq. 1, D F G/(n·v) [Chen2007] Eq. 2 or √(n·l/n·v) exp(−q) [Ward1992]
+        (zero for the diffuse models); zero where n·l ≤ 0 or n·v ≤ 0.
     """
     normal, light, view = np.broadcast_arrays(*(np.asarray(a, float) for a in (normal, light, view)))
     _, distribution, attenuation = MODELS[model]
@@ -107,6 +162,15 @@ def basis(model, shape, normal, light, view, *, index=1.5, fresnel="facet"):
     diffuse = np.where(faces, n_l, 0)
     if model == "lambert":
         return diffuse, np.zeros_like(diffuse)
+    if model == "oren-nayar":
+        roughened = n_l * oren_nayar(n_l, n_v, dot(light, view), np.asarray(shape, float))
+        return np.where(faces, roughened, 0), np.zeros_like(diffuse)
+    if model == "torrance-sparrow-2":
+        each = [
+            basis("torrance-sparrow", c, normal, light, view, index=index, fresnel=fresnel)[1]
+            for c in np.moveaxis(np.asarray(shape, float), -1, 0)
+        ]
+        return diffuse, np.stack(each, -1)
     if model == "phong":
         mirror = 2 * n_l[..., None] * normal - light
         return diffuse, np.where(faces, np.maximum(0, dot(mirror, view)) ** shape, 0)
@@ -118,6 +182,11 @@ def basis(model, shape, normal, light, view, *, index=1.5, fresnel="facet"):
     if model == "ward":
         lobe = np.sqrt(n_l / n_v) * np.exp(-(1 / n_h**2 - 1) / np.asarray(shape) ** 2)
         return diffuse, np.where(faces, lobe, 0)
+    if model == "ward-anisotropic":
+        x_axis, y_axis = turned_axes(normal)
+        slopes = dot(half, x_axis) / n_h, dot(half, y_axis) / n_h
+        q = bivariate_gaussian(*slopes, *np.moveaxis(np.asarray(shape, float), -1, 0))
+        return diffuse, np.where(faces, np.sqrt(n_l / n_v) * q, 0)
     if distribution == "generalised-trowbridge-reitz":
         d = generalised_trowbridge_reitz(n_h, *np.moveaxis(np.asarray(shape, float), -1, 0))
     else:
@@ -190,7 +259,7 @@ def radiance(
         A name in `MODELS`; a suffix that says whether the fit has an ambient term makes no difference here.
     normal : array_like of shape (N, 3)
     diffuse : array_like of shape (N, C)
-    specular : array_like of shape (N,) or (N, 1)
+    specular : array_like of shape (N,) or (N, lobes)
     shape : array_like of shape (N,) or (N, S)
     ambient : array_like of shape (N, C), optional
     light_direction, light_position_mm : array_like of shape (L, 3)
@@ -220,11 +289,12 @@ def radiance(
     several = len(MODELS[base_name(model)][0])
     form = (pixels, several) if several > 1 else pixels
     flat_shape = np.zeros(pixels) if np.size(shape) == 0 else np.reshape(np.asarray(shape, float), form)
-    flat_specular = np.zeros(pixels) if np.size(specular) == 0 else np.reshape(specular, pixels)
     of_diffuse, of_specular = basis(
         base_name(model), flat_shape, normal, light, view, index=index, fresnel=fresnel
     )
-    total = of_diffuse[..., None] * diffuse + (of_specular * flat_specular)[..., None] * light_rgb
+    of_specular = of_specular.reshape(*of_diffuse.shape, -1)
+    magnitude = np.zeros((pixels, 1)) if np.size(specular) == 0 else np.reshape(specular, (pixels, -1))
+    total = of_diffuse[..., None] * diffuse + (of_specular * magnitude).sum(-1)[..., None] * light_rgb
     if ambient is not None:
         total = total + np.asarray(ambient, float)
     return total * irradiance[..., None] * intensity[:, None, :]

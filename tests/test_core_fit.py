@@ -17,7 +17,6 @@ from impasto.geometry import dome_direction
 from reference_models import unit
 
 NOISE = (1e-3, 0.0, 0.01)
-SHAPES = {"c": 0.25, "m": 0.25, "shininess": 30.0, "alpha": 0.25, "exponent": 1.6}
 
 
 def names():
@@ -67,13 +66,14 @@ def truth(model, pixels=24):
     """Return parameter maps in float64 for the reference's `radiance`."""
     entry, ambient = entry_of(model)
     rng, base = np.random.default_rng(5), entry["name"]
-    shape = [SHAPES[parameter[0]] for parameter in entry["shape"]]
+    peak = (0.3, 0.6) if base in ("phong", "ward", "ward-anisotropic") else (8, 15)
+    # Seen along its normal, a rough diffuse surface looks like a smooth one that is darker.
+    tilt = np.radians((25, 50) if base == "oren-nayar" else (0, 15))
+    shape = [reference.TYPICAL[parameter[0]] for parameter in entry["shape"]]
     maps = {
-        "normal": dome_direction(np.radians(rng.uniform(0, 15, pixels)), rng.uniform(0, 2 * np.pi, pixels)),
+        "normal": dome_direction(rng.uniform(*tilt, pixels), rng.uniform(0, 2 * np.pi, pixels)),
         "diffuse": rng.uniform(0.1, 0.8, (pixels, 3)),
-        "specular": rng.uniform(0.3, 0.6, pixels)
-        if base in ("phong", "ward")
-        else rng.uniform(8, 15, pixels),
+        "specular": rng.uniform(*peak, (pixels, entry["lobes"])),
         "shape": shape * rng.uniform(0.8, 1.2, (pixels, len(shape))),
     }
     if ambient:
@@ -109,7 +109,8 @@ def standard_deviations(model, maps, light_direction):
         "diffuse": [channel_step("diffuse", channel) for channel in range(3)],
     }
     if entry["lobes"]:
-        parameters["specular"] = [lambda step: {"specular": maps["specular"] + step}]
+        parameters["specular"] = [channel_step("specular", lobe) for lobe in range(entry["lobes"])]
+    if count:
         parameters["shape"] = [
             lambda step, index=index: {"shape": maps["shape"] * (1 + step * (np.arange(count) == index))}
             for index in range(count)
@@ -130,7 +131,7 @@ def standard_deviations(model, maps, light_direction):
     }
     deviations = {f"{name}_sd": np.sqrt(values) for name, values in slices.items()}
     deviations["normal_sd"] = np.sqrt(slices["normal"].sum(axis=1))
-    if entry["lobes"]:
+    if count:
         deviations["shape_sd"] *= maps["shape"]
     return deviations
 
@@ -141,11 +142,12 @@ def test_recovers_its_own_rendering_with_the_reference_standard_deviations(model
     maps = truth(model)
     fitted = fit(model, reference.radiance(model, **maps, light_direction=lights).astype(np.float32), lights)
     assert not fitted["status"].any()
-    np.testing.assert_allclose(fitted["normal"], maps["normal"], atol=1e-5)
     deviations = standard_deviations(model, maps, lights)
     # Two shape parameters can stand in for each other: the weak priors then show, at a small part of the
     # uncertainty.
     share = 0.05 if maps["shape"].shape[1] > 1 else 0.0
+    slack = 1e-5 + share * deviations["normal_sd"][:, None]
+    assert (np.abs(fitted["normal"] - maps["normal"]) <= slack).all()
     for name, tolerance in [("diffuse", 1e-4), ("specular", 1e-3), ("shape", 1e-3)]:
         if f"{name}_sd" in deviations:
             expected = maps[name].reshape(fitted[name].shape)

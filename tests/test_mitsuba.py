@@ -59,6 +59,37 @@ def test_distribution(c, directions):
     np.testing.assert_allclose(d, expected, rtol=1e-5)
 
 
+@pytest.mark.parametrize(("c", "c2"), [(0.02, 0.3), (0.1, 1.0)])
+def test_distributions_of_two_lobes(c, c2, directions):
+    light, view = directions
+    normal = np.tile(UPRIGHT, (len(light), 1))
+    shape = np.tile([c, c2], (len(light), 1))
+    lobes = _core.basis("torrance-sparrow-2", normal, light, view, shape, index=INDEX, fresnel="facet")[:, 1:]
+    flat = core_lobe("torrance-sparrow", 1.0, light, view)
+    for lobe, width in zip(lobes.T, (c, c2), strict=True):
+        expected = [np.pi * width**2 * ggx(width).eval(vector(half)) for half in reference.unit(light + view)]
+        np.testing.assert_allclose(lobe / flat, expected, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("alpha_x", "alpha_y", "correlation"), [(0.1, 0.3, 0.0), (0.3, 0.15, 0.6), (0.25, 0.25, -0.8)]
+)
+def test_anisotropic_slopes(alpha_x, alpha_y, correlation, directions):
+    # Mitsuba's Beckmann distribution of slopes has axes of its own: those of the covariance.
+    light, view = directions
+    cross = correlation * alpha_x * alpha_y
+    variances, axes = np.linalg.eigh([[alpha_x**2, cross], [cross, alpha_y**2]])
+    alpha_u, alpha_v = (float(each) for each in np.sqrt(variances))
+    beckmann = mi.MicrofacetDistribution(mi.MicrofacetType.Beckmann, alpha_u, alpha_v, sample_visible=False)
+    half = reference.unit(light + view)
+    turned = np.concatenate([half[:, :2] @ axes, half[:, 2:]], axis=1)
+    expected = [np.pi * alpha_u * alpha_v * h[2] ** 4 * beckmann.eval(vector(h)) for h in turned]
+    shape = np.tile([alpha_x, alpha_y, correlation], (len(light), 1))
+    normal = np.tile(UPRIGHT, (len(light), 1))
+    lobe = _core.basis("ward-anisotropic", normal, light, view, shape, index=INDEX, fresnel="facet")[:, 1]
+    np.testing.assert_allclose(lobe / np.sqrt(light[:, 2] / view[:, 2]), expected, rtol=1e-4, atol=1e-12)
+
+
 @pytest.mark.parametrize("index", [1.33, 1.5, 2.4])
 def test_fresnel(index, directions):
     light, view = directions

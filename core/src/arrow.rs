@@ -6,22 +6,21 @@
 
 use crate::lanes::{Isa, Lane, LaneMask, outlined};
 use crate::minimise::solve_symmetric;
-use crate::models::MAX_LOBES;
 use crate::number::{Mask, Number, Real, array};
 
 /// A vector shaped like the magnitudes: (diffuse, ambient) per channel, then one number per lobe.
 #[derive(Clone, Copy)]
-pub struct Magnitudes<const ISA: Isa, const C: usize> {
+pub struct Magnitudes<const ISA: Isa, const C: usize, const L: usize = 1> {
     pub diffuse: [Lane<ISA>; C],
     pub ambient: [Lane<ISA>; C],
-    pub specular: [Lane<ISA>; MAX_LOBES],
+    pub specular: [Lane<ISA>; L],
 }
 
-impl<const ISA: Isa, const C: usize> Magnitudes<ISA, C> {
+impl<const ISA: Isa, const C: usize, const L: usize> Magnitudes<ISA, C, L> {
     #[inline(always)]
     pub fn zero() -> Self {
         let zero = Lane::splat(0.0);
-        Magnitudes { diffuse: [zero; C], ambient: [zero; C], specular: [zero; MAX_LOBES] }
+        Magnitudes { diffuse: [zero; C], ambient: [zero; C], specular: [zero; L] }
     }
 
     #[inline(always)]
@@ -31,7 +30,7 @@ impl<const ISA: Isa, const C: usize> Magnitudes<ISA, C> {
             sum = self.diffuse[k].mul_add(other.diffuse[k], sum);
             sum = self.ambient[k].mul_add(other.ambient[k], sum);
         }
-        for j in 0..MAX_LOBES {
+        for j in 0..L {
             sum = self.specular[j].mul_add(other.specular[j], sum);
         }
         sum
@@ -40,13 +39,13 @@ impl<const ISA: Isa, const C: usize> Magnitudes<ISA, C> {
 
 /// Which magnitudes are free; the others are held at 0.
 #[derive(Clone, Copy)]
-struct Free<const C: usize> {
+struct Free<const C: usize, const L: usize> {
     diffuse: [LaneMask; C],
     ambient: [LaneMask; C],
-    specular: [LaneMask; MAX_LOBES],
+    specular: [LaneMask; L],
 }
 
-impl<const C: usize> Free<C> {
+impl<const C: usize, const L: usize> Free<C, L> {
     #[inline(always)]
     fn new(lobes: usize, ambient: bool) -> Self {
         Free {
@@ -59,26 +58,26 @@ impl<const C: usize> Free<C> {
 
 /// Weighted sums of products of the basis functions over the lights, for one channel.
 #[derive(Clone, Copy)]
-struct ChannelSums<const ISA: Isa> {
+struct ChannelSums<const ISA: Isa, const L: usize> {
     diffuse_diffuse: Lane<ISA>,
     diffuse_one: Lane<ISA>,
     one_one: Lane<ISA>,
-    diffuse_specular: [Lane<ISA>; MAX_LOBES],
-    one_specular: [Lane<ISA>; MAX_LOBES],
+    diffuse_specular: [Lane<ISA>; L],
+    one_specular: [Lane<ISA>; L],
 }
 
 /// The normal equations of the magnitudes: a matrix and a right-hand side.
 #[derive(Clone, Copy)]
-pub struct Arrow<const ISA: Isa, const C: usize> {
-    channel: [ChannelSums<ISA>; C],
-    specular_specular: [[Lane<ISA>; MAX_LOBES]; MAX_LOBES],
+pub struct Arrow<const ISA: Isa, const C: usize, const L: usize = 1> {
+    channel: [ChannelSums<ISA, L>; C],
+    specular_specular: [[Lane<ISA>; L]; L],
     /// Whether the ambient magnitudes are fitted.
     ambient: bool,
     /// Projections of the data on the basis functions.
-    pub right: Magnitudes<ISA, C>,
+    pub right: Magnitudes<ISA, C, L>,
 }
 
-impl<const ISA: Isa, const C: usize> Arrow<ISA, C> {
+impl<const ISA: Isa, const C: usize, const L: usize> Arrow<ISA, C, L> {
     #[inline(always)]
     pub fn new(ambient: bool) -> Self {
         let zero = Lane::splat(0.0);
@@ -86,15 +85,10 @@ impl<const ISA: Isa, const C: usize> Arrow<ISA, C> {
             diffuse_diffuse: zero,
             diffuse_one: zero,
             one_one: zero,
-            diffuse_specular: [zero; MAX_LOBES],
-            one_specular: [zero; MAX_LOBES],
+            diffuse_specular: [zero; L],
+            one_specular: [zero; L],
         };
-        Arrow {
-            channel: [sums; C],
-            specular_specular: [[zero; MAX_LOBES]; MAX_LOBES],
-            ambient,
-            right: Magnitudes::zero(),
-        }
+        Arrow { channel: [sums; C], specular_specular: [[zero; L]; L], ambient, right: Magnitudes::zero() }
     }
 
     /// Adds one light: its basis values, and per channel radiance and weight. `colour` is the light's.
@@ -103,7 +97,7 @@ impl<const ISA: Isa, const C: usize> Arrow<ISA, C> {
         &mut self,
         lobes: usize,
         diffuse: Lane<ISA>,
-        specular: &[Lane<ISA>; MAX_LOBES],
+        specular: &[Lane<ISA>; L],
         radiance: &[Lane<ISA>; C],
         weight: &[Lane<ISA>; C],
         colour: &[Lane<ISA>; C],
@@ -151,7 +145,7 @@ impl<const ISA: Isa, const C: usize> Arrow<ISA, C> {
 
     /// Eliminates the channels' blocks.
     #[inline(always)]
-    fn factor(&self, lobes: usize, free: &Free<C>) -> Factored<ISA, C> {
+    fn factor(&self, lobes: usize, free: &Free<C, L>) -> Factored<ISA, C, L> {
         let zero = Lane::splat(0.0);
         let one = Lane::splat(1.0);
         let mut inverse = [BlockInverse { diffuse: zero, cross: zero, ambient: zero }; C];
@@ -204,7 +198,7 @@ impl<const ISA: Isa, const C: usize> Arrow<ISA, C> {
 
     /// The magnitudes that fit best, none of them negative, and the factored equations of those that are not held at 0.
     #[inline(always)]
-    pub fn magnitudes(&self, lobes: usize) -> (Magnitudes<ISA, C>, Factored<ISA, C>) {
+    pub fn magnitudes(&self, lobes: usize) -> (Magnitudes<ISA, C, L>, Factored<ISA, C, L>) {
         outlined::<ISA, _>(
             #[inline(always)]
             || self.nonnegative(lobes),
@@ -212,7 +206,7 @@ impl<const ISA: Isa, const C: usize> Arrow<ISA, C> {
     }
 
     #[inline(always)]
-    fn nonnegative(&self, lobes: usize) -> (Magnitudes<ISA, C>, Factored<ISA, C>) {
+    fn nonnegative(&self, lobes: usize) -> (Magnitudes<ISA, C, L>, Factored<ISA, C, L>) {
         let zero = Lane::splat(0.0);
         let mut free = Free::new(lobes, self.ambient);
         // Holding every negative magnitude at 0 at once is not quite the constrained optimum where two of them are negative
@@ -273,17 +267,17 @@ impl<const ISA: Isa> BlockInverse<ISA> {
 
 /// The normal equations, ready to be solved for any right-hand side.
 #[derive(Clone, Copy)]
-pub struct Factored<const ISA: Isa, const C: usize> {
-    channel: [ChannelSums<ISA>; C],
+pub struct Factored<const ISA: Isa, const C: usize, const L: usize = 1> {
+    channel: [ChannelSums<ISA, L>; C],
     lobes: usize,
     pub ambient: bool,
     inverse: [BlockInverse<ISA>; C],
-    schur: [[Lane<ISA>; MAX_LOBES]; MAX_LOBES],
+    schur: [[Lane<ISA>; L]; L],
 }
 
-impl<const ISA: Isa, const C: usize> Factored<ISA, C> {
+impl<const ISA: Isa, const C: usize, const L: usize> Factored<ISA, C, L> {
     #[inline(always)]
-    pub fn solve(&self, right: &Magnitudes<ISA, C>) -> Magnitudes<ISA, C> {
+    pub fn solve(&self, right: &Magnitudes<ISA, C, L>) -> Magnitudes<ISA, C, L> {
         outlined::<ISA, _>(
             #[inline(always)]
             || self.solve_inline(right),
@@ -291,7 +285,7 @@ impl<const ISA: Isa, const C: usize> Factored<ISA, C> {
     }
 
     #[inline(always)]
-    fn solve_inline(&self, right: &Magnitudes<ISA, C>) -> Magnitudes<ISA, C> {
+    fn solve_inline(&self, right: &Magnitudes<ISA, C, L>) -> Magnitudes<ISA, C, L> {
         let mut result = *right;
         for k in 0..C {
             (result.diffuse[k], result.ambient[k]) =

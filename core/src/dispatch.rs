@@ -3,6 +3,7 @@
 //! The fit and the renderer are compiled for several sets of instructions; which of them runs is decided when it is called.
 //! The inner functions are inlined whole, so that they inherit the instructions from here.
 
+use crate::geometry::Illumination;
 use crate::joint::{JointFit, Options};
 use crate::lanes::{FUSED, Isa, LANES, PLAIN, WIDE, outlined};
 use crate::models::{Model, Optics, ShapeParameter};
@@ -103,88 +104,121 @@ macro_rules! with_instructions {
     };
 }
 
-#[inline(always)]
-fn fit_block<F: FitGroup>(fit: &mut F, block: usize, rows: &mut [f32], status: &mut [u8]) {
-    let width = fit.layout().width();
-    for (group, (rows, status)) in rows.chunks_mut(LANES * width).zip(status.chunks_mut(LANES)).enumerate() {
-        fit.fit_group(block * BLOCK + group * LANES, rows, status);
-    }
-}
-
-/// Fits a tile with all threads, each with a fit that `make` makes for `ISA`.
-fn fit_tile<const ISA: Isa, F: FitGroup>(pixels: usize, make: impl Fn() -> F + Sync + Send, layout: Layout) -> Fitted {
+/// Fits a tile with all threads, each with a fit that `make` makes; `fit_block` fits the pixels of a block.
+#[inline]
+fn fit_tile<F: FitGroup>(
+    pixels: usize,
+    layout: Layout,
+    make: impl Fn() -> F + Sync + Send,
+    fit_block: impl Fn(&mut F, usize, &mut [f32], &mut [u8]) + Sync + Send,
+) -> Fitted {
     let width = layout.width();
     let mut rows = vec![0.0; pixels * width];
     let mut status = vec![0; pixels];
     let blocks = rows.par_chunks_mut(BLOCK * width).zip(status.par_chunks_mut(BLOCK)).enumerate();
-    blocks.for_each_init(make, |fit, (block, (rows, status))| {
-        outlined::<ISA, _>(
-            #[inline(always)]
-            || fit_block(fit, block, rows, status),
-        )
-    });
+    blocks.for_each_init(make, |fit, (block, (rows, status))| fit_block(fit, block * BLOCK, rows, status));
     Fitted { layout, rows, status }
 }
 
-fn fit_joint<M: Model, const P: usize>(stack: &Stack, colour: &[f64], options: Options) -> Fitted {
-    with_instructions!(ISA => {
-        let make = || JointFit::<M, ISA, MAX_CHANNELS, P>::new(stack, colour, options);
-        let layout = JointFit::<M, ISA, MAX_CHANNELS, P>::layout(stack.channels, options.ambient);
-        fit_tile::<ISA, _>(stack.pixels, make, layout)
-    })
-}
-
-fn fit_paper<M: Model>(stack: &Stack, colour: &[f64], sample: Sample, options: Options) -> Option<Fitted> {
-    with_instructions!(ISA => PaperFit::<M, ISA, MAX_CHANNELS>::APPLIES.then(|| {
-        let make = || PaperFit::<M, ISA, MAX_CHANNELS>::new(stack, colour, sample, options);
-        fit_tile::<ISA, _>(stack.pixels, make, Layout::paper(stack.channels))
-    }))
-}
-
 #[inline(always)]
-fn render_block<M: Model, const ISA: Isa>(
-    parameters: &Parameters,
-    view: &View,
-    optics: &Optics,
-    block: usize,
-    radiance: &mut [f32],
-) {
-    for (group, radiance) in radiance.chunks_mut(LANES * view.intensity.len()).enumerate() {
-        render_group::<M, ISA>(parameters, view, optics, block * BLOCK + group * LANES, radiance);
+fn fit_groups<const ISA: Isa, F: FitGroup>(fit: &mut F, first: usize, rows: &mut [f32], status: &mut [u8]) {
+    let width = fit.layout().width();
+    for (group, (rows, status)) in rows.chunks_mut(LANES * width).zip(status.chunks_mut(LANES)).enumerate() {
+        fit.fit_group(first + group * LANES, rows, status);
     }
 }
 
-fn render_light<M: Model>(parameters: &Parameters, view: &View, optics: &Optics, radiance: &mut [f32]) {
-    let blocks = radiance.par_chunks_mut(BLOCK * view.intensity.len()).enumerate();
-    with_instructions!(ISA => blocks.for_each(|(block, radiance)| {
-        outlined::<ISA, _>(
-            #[inline(always)]
-            || render_block::<M, ISA>(parameters, view, optics, block, radiance),
-        )
-    }));
-}
-
 macro_rules! dispatch {
-    ($(($name:literal, $model:ty, $ambient:literal)),* $(,)?) => {
+    ($(($module:ident, $name:literal, $model:ty, $room:tt, $ambient:literal)),* $(,)?) => {
+        $(
+            /// One model. A module for each makes a unit of compilation for each, so that several are compiled at once: what is
+            /// large is generic over the instructions and defined here, or inlined into what is.
+            mod $module {
+                use super::*;
+
+                type This = $model;
+                const P: usize = 2 + <This as Model<$room>>::SHAPE.len();
+                type Joint<'a, const ISA: Isa> = JointFit<'a, This, ISA, MAX_CHANNELS, P, $room>;
+
+                #[inline(never)]
+                fn joint_block<const ISA: Isa>(
+                    fit: &mut Joint<'_, ISA>,
+                    first: usize,
+                    rows: &mut [f32],
+                    status: &mut [u8],
+                ) {
+                    outlined::<ISA, _>(
+                        #[inline(always)]
+                        || fit_groups::<ISA, _>(fit, first, rows, status),
+                    )
+                }
+
+                pub fn fit(stack: &Stack, colour: &[f64], options: Options) -> Fitted {
+                    with_instructions!(ISA => {
+                        let layout = Joint::<ISA>::layout(stack.channels, options.ambient);
+                        let make = || Joint::<ISA>::new(stack, colour, options);
+                        fit_tile(stack.pixels, layout, make, joint_block::<ISA>)
+                    })
+                }
+
+                dispatch!(@paper $room);
+
+                #[inline(never)]
+                fn render_block<const ISA: Isa>(
+                    parameters: &Parameters,
+                    view: &View,
+                    optics: &Optics,
+                    first: usize,
+                    radiance: &mut [f32],
+                ) {
+                    outlined::<ISA, _>(
+                        #[inline(always)]
+                        || {
+                            for (group, radiance) in radiance.chunks_mut(LANES * view.intensity.len()).enumerate() {
+                                let first = first + group * LANES;
+                                render_group::<This, ISA, $room>(parameters, view, optics, first, radiance);
+                            }
+                        },
+                    )
+                }
+
+                pub fn render(parameters: &Parameters, view: &View, optics: &Optics, radiance: &mut [f32]) {
+                    let blocks = radiance.par_chunks_mut(BLOCK * view.intensity.len()).enumerate();
+                    with_instructions!(ISA => blocks.for_each(|(block, radiance)| {
+                        render_block::<ISA>(parameters, view, optics, block * BLOCK, radiance)
+                    }));
+                }
+
+                pub fn basis_slopes(view: &slopes::View, optics: &Optics) -> Vec<f64> {
+                    slopes::basis_slopes::<This, P, $room>(view, optics)
+                }
+
+                pub fn basis(normal: [f64; 3], shape: &[f64], at: &Illumination<f64>, optics: &Optics) -> Vec<f64> {
+                    let basis = <This as Model<$room>>::basis(normal, shape, at, optics);
+                    let mut values = vec![basis.diffuse];
+                    values.extend(&basis.specular[..<This as Model<$room>>::LOBES]);
+                    values
+                }
+            }
+        )*
+
         /// Every model that has a name.
         pub fn entries() -> Vec<Entry> {
             vec![$(Entry {
                 name: $name,
-                title: <$model>::title(),
-                citations: <$model>::citations(),
-                shape: <$model>::SHAPE,
-                lobes: <$model>::LOBES,
+                title: <$model as Model<$room>>::title(),
+                citations: <$model as Model<$room>>::citations(),
+                shape: <$model as Model<$room>>::SHAPE,
+                lobes: <$model as Model<$room>>::LOBES,
                 ambient_by_default: $ambient,
-                reciprocal: <$model>::RECIPROCAL,
+                reciprocal: <$model as Model<$room>>::RECIPROCAL,
             }),*]
         }
 
         /// Fits a tile; `None` if no model has the name.
         pub fn fit(name: &str, stack: &Stack, colour: &[f64], options: Options) -> Option<Fitted> {
             match name {
-                $(
-                    $name => Some(fit_joint::<$model, { 2 + <$model>::SHAPE.len() }>(stack, colour, options)),
-                                    )*
+                $($name => Some($module::fit(stack, colour, options)),)*
                 _ => None,
             }
         }
@@ -198,9 +232,7 @@ macro_rules! dispatch {
             options: Options,
         ) -> Option<Fitted> {
             match name {
-                $(
-                    $name => fit_paper::<$model>(stack, colour, sample, options),
-                )*
+                $($name => $module::paper(stack, colour, sample, options),)*
                 _ => None,
             }
         }
@@ -208,7 +240,7 @@ macro_rules! dispatch {
         /// Renders one light into `radiance`, (pixel, channel); `false` if no model has the name.
         pub fn render(name: &str, parameters: &Parameters, view: &View, optics: &Optics, radiance: &mut [f32]) -> bool {
             match name {
-                $($name => render_light::<$model>(parameters, view, optics, radiance),)*
+                $($name => $module::render(parameters, view, optics, radiance),)*
                 _ => return false,
             }
             true
@@ -217,9 +249,7 @@ macro_rules! dispatch {
         /// The basis functions and their slopes; `None` if no model has the name.
         pub fn basis_slopes(name: &str, view: &slopes::View, optics: &Optics) -> Option<Vec<f64>> {
             match name {
-                $(
-                    $name => Some(slopes::basis_slopes::<$model, { 2 + <$model>::SHAPE.len() }>(view, optics)),
-                )*
+                $($name => Some($module::basis_slopes(view, optics)),)*
                 _ => None,
             }
         }
@@ -229,18 +259,45 @@ macro_rules! dispatch {
             name: &str,
             normal: [f64; 3],
             shape: &[f64],
-            at: &crate::geometry::Illumination<f64>,
+            at: &Illumination<f64>,
             optics: &Optics,
         ) -> Option<Vec<f64>> {
             match name {
-                $($name => {
-                    let basis = <$model>::basis(normal, shape, at, optics);
-                    let mut values = vec![basis.diffuse];
-                    values.extend(&basis.specular[..<$model>::LOBES]);
-                    Some(values)
-                })*
+                $($name => Some($module::basis(normal, shape, at, optics)),)*
                 _ => None,
             }
+        }
+    };
+
+    // The paper's procedure, which is defined for one lobe.
+    (@paper 1) => {
+        #[inline(never)]
+        fn paper_block<const ISA: Isa>(
+            fit: &mut PaperFit<'_, This, ISA, MAX_CHANNELS>,
+            first: usize,
+            rows: &mut [f32],
+            status: &mut [u8],
+        ) {
+            outlined::<ISA, _>(
+                #[inline(always)]
+                || fit_groups::<ISA, _>(fit, first, rows, status),
+            )
+        }
+
+        pub fn paper(stack: &Stack, colour: &[f64], sample: Sample, options: Options) -> Option<Fitted> {
+            with_instructions!(ISA => {
+                // The compiler leaves out what this never reaches.
+                if const { !PaperFit::<This, ISA, MAX_CHANNELS>::APPLIES } {
+                    return None;
+                }
+                let make = || PaperFit::<This, ISA, MAX_CHANNELS>::new(stack, colour, sample, options);
+                Some(fit_tile(stack.pixels, Layout::paper(stack.channels), make, paper_block::<ISA>))
+            })
+        }
+    };
+    (@paper $room:tt) => {
+        pub fn paper(_: &Stack, _: &[f64], _: Sample, _: Options) -> Option<Fitted> {
+            None
         }
     };
 }

@@ -113,6 +113,25 @@ impl Place {
     }
 }
 
+/// The unit vector across the plane in which all lights lie, seen from the centre of the painting; `None` where they do not
+/// lie in one, or on a line.
+pub fn across(lights: &[Place]) -> Option<[f64; 3]> {
+    /// The sine of 1°: an arm that is set up by hand sweeps a plane no better.
+    const FLAT: f64 = 0.0175;
+    let directions: Vec<[f64; 3]> = lights.iter().map(|place| place.seen_from(0.0, 0.0).0).collect();
+    let crosses = directions.iter().map(|direction| cross(directions[0], *direction));
+    let widest = crosses.max_by(|a, b| dot(*a, *a).total_cmp(&dot(*b, *b)))?;
+    if dot(widest, widest) < FLAT * FLAT {
+        return None;
+    }
+    let across = normalise(widest);
+    directions.iter().all(|direction| dot(*direction, across).abs() < FLAT).then_some(across)
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
 /// Two unit vectors that span the plane perpendicular to `normal`, whose z must be positive ([Duff2017]; their other
 /// branch is for z < 0).
 #[inline(always)]
@@ -138,6 +157,15 @@ mod tests {
         // The mirror direction's tilt: sin φr = sin 2φn cos(θa − θn).
         let reflected: [f64; 3] = array!(|i| 2.0 * dot(normal, light) * normal[i] - light[i]);
         assert!((reflected[1] - (2.0 * phi_n).sin() * (theta_a - theta_n).cos()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn lights_on_an_arm_lie_in_a_plane_and_those_of_a_dome_do_not() {
+        let arm = [-0.6f64, 0.1, 0.9].map(|angle| Place::Direction([angle.sin(), 0.0, angle.cos()]));
+        assert_eq!(across(&arm).map(|axis| axis[1].abs()), Some(1.0));
+        let raised = Place::Position([0.0, 300.0, 1000.0]);
+        assert_eq!(across(&[&arm[..], &[raised]].concat()), None);
+        assert_eq!(across(&arm[..1]), None);
     }
 
     #[test]

@@ -1,17 +1,23 @@
 //! The joint fit: normal, shape and magnitudes of a pixel over all its lights at once.
 
-use crate::lanes::{Isa, Lane};
-use crate::minimise::{Objective, inverse, minimise};
-use crate::models::{MAX_LOBES, MAX_SHAPE, Model, Optics};
+use crate::arrow::Magnitudes;
+use crate::dual::Dual;
+use crate::geometry::{Illumination, across};
+use crate::lanes::{Isa, Lane, LaneMask};
+use crate::minimise::{Objective, Outcome, inverse, minimise};
+use crate::models::{MAX_SHAPE, Model, Optics};
 use crate::number::{Mask, Number, Real, array};
 use crate::observations::{Group, Stack};
 use crate::record::{FitGroup, Layout, Row, Status};
-use crate::separable::{Loss, Point, Scratch, Separable, Solution};
-use crate::start::{Grey, candidates, doubt_shadows, grey, start, start_at};
+use crate::robust::Loss;
+use crate::separable::{Point, Scratch, Separable, Solution, propagated};
+use crate::start::{ASIDE, Grey, aside, candidates, doubt_shadows, grey, start, start_at, starts};
 use std::marker::PhantomData;
 
 /// Rounds of a robust fit with a wider loss before the one with the loss asked for.
 const ROBUST_STAGES: usize = 2;
+/// Steps from each start, where there are several.
+const EXPLORING_STEPS: usize = 12;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
@@ -19,13 +25,10 @@ pub struct Options {
     pub loss: Loss,
     pub max_steps: usize,
     pub ambient: bool,
-    /// The normal of every pixel, where the surface is known; it is then not fitted, and nothing else is assumed of the
-    /// material either: the weak priors are off.
-    pub normal: Option<[f64; 3]>,
 }
 
 /// The fit of groups of pixels, with its buffers.
-pub struct JointFit<'a, M, const ISA: Isa, const C: usize, const P: usize> {
+pub struct JointFit<'a, M, const ISA: Isa, const C: usize, const P: usize, const L: usize> {
     stack: &'a Stack<'a>,
     options: Options,
     colour: [Lane<ISA>; C],
@@ -33,11 +36,13 @@ pub struct JointFit<'a, M, const ISA: Isa, const C: usize, const P: usize> {
     grey: Vec<Grey<ISA>>,
     /// Share of each light's weight that its samples keep at the start of a robust fit.
     kept: Vec<Lane<ISA>>,
-    scratch: Scratch<ISA, C, P>,
+    scratch: Scratch<ISA, C, P, L>,
+    /// Across the plane of the lights, where they lie in one.
+    across: Option<[f64; 3]>,
     model: PhantomData<M>,
 }
 
-impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> JointFit<'a, M, ISA, C, P> {
+impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize> JointFit<'a, M, ISA, C, P, L> {
     pub fn layout(channels: usize, ambient: bool) -> Layout {
         Layout::joint(channels, M::LOBES, P - 2, if ambient { channels } else { 0 })
     }
@@ -57,12 +62,15 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> JointFit<'a, 
             grey: Vec::with_capacity(stack.lights.len()),
             kept: Vec::with_capacity(stack.lights.len()),
             scratch: Scratch::new(stack.lights.len()),
+            across: across(&stack.lights),
             model: PhantomData,
         }
     }
 }
 
-impl<M: Model, const ISA: Isa, const C: usize, const P: usize> FitGroup for JointFit<'_, M, ISA, C, P> {
+impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize> FitGroup
+    for JointFit<'_, M, ISA, C, P, L>
+{
     fn layout(&self) -> Layout {
         Self::layout(self.stack.channels, self.options.ambient)
     }
@@ -78,15 +86,10 @@ impl<M: Model, const ISA: Isa, const C: usize, const P: usize> FitGroup for Join
         if robust {
             doubt_shadows(&mut self.grey, illuminations, &mut self.kept);
         }
-        let known: Option<[Lane<ISA>; 3]> = self.options.normal.map(|normal| array!(|i| Lane::splat(normal[i])));
-        let mut begin = match known {
-            Some(normal) => start_at::<M, ISA>(normal, &self.grey, illuminations, &optics, ambient),
-            None => {
-                start::<M, ISA>(&candidates(&self.grey, illuminations), &self.grey, illuminations, &optics, ambient)
-            }
-        };
-
-        let mut problem = Separable::<M, ISA, C, P>::new(
+        let known = self.stack.known_normal::<ISA>(first);
+        let find =
+            |normals: &[[Lane<ISA>; 3]]| start_of::<M, ISA, L>(normals, &self.grey, illuminations, &optics, ambient);
+        let mut problem = Separable::<M, ISA, C, P, L>::new(
             &self.group,
             self.colour,
             optics,
@@ -96,8 +99,19 @@ impl<M: Model, const ISA: Isa, const C: usize, const P: usize> FitGroup for Join
         );
         problem.hold_normal = known.is_some();
         problem.prior = known.is_none();
+        let mut begin = match (known, self.across) {
+            (Some(normal), _) => {
+                let points = starts::<M, ISA, L>().map(|coordinates| Point { normal, coordinates });
+                explore(&mut problem, points, wanted)
+            }
+            (None, Some(across)) => {
+                let normals = candidates(&self.grey, illuminations);
+                explore(&mut problem, ASIDE.iter().map(|&angle| find(&aside(&normals, across, angle))), wanted)
+            }
+            (None, None) => find(&candidates(&self.grey, illuminations)),
+        };
         if robust {
-            problem.trust(&self.kept);
+            problem.robust.trust(&self.kept);
             // Far from the minimum every sample is an outlier: the loss first takes the residuals for noise.
             for _ in 0..ROBUST_STAGES {
                 problem.scale_loss(Some(&begin));
@@ -109,18 +123,26 @@ impl<M: Model, const ISA: Isa, const C: usize, const P: usize> FitGroup for Join
         let mut solution = problem.solve(&outcome.point);
         // A lobe of magnitude 0 gives its shape no gradient, so a fit that comes there cannot leave. From the normal that it
         // found the grid of shapes may show a better lobe.
-        let trapped = wanted & !solution.magnitudes.specular[0].positive();
-        if M::LOBES > 0 && known.is_none() && trapped.any() {
-            let again = start::<M, ISA>(&[outcome.point.normal], &self.grey, illuminations, &optics, ambient);
-            let retried = minimise(&mut problem, &again, trapped, self.options.max_steps);
+        let mut trapped = LaneMask::NONE;
+        for j in 0..M::LOBES {
+            trapped = trapped | !solution.magnitudes.specular[j].positive();
+        }
+        trapped = trapped & wanted;
+        if known.is_none() && trapped.any() {
+            let retried = minimise(&mut problem, &find(&[outcome.point.normal]), trapped, self.options.max_steps);
             let better = retried.cost.lt(solution.quadratic.cost) & trapped;
-            outcome.point = Separable::<M, ISA, C, P>::select(better, &retried.point, &outcome.point);
+            outcome.point = Separable::<M, ISA, C, P, L>::select(better, &retried.point, &outcome.point);
             outcome.converged = (outcome.converged & !better) | (retried.converged & better);
+            solution = problem.solve(&outcome.point);
+        }
+        if L > 1 {
+            outcome.point.coordinates = M::ordered(outcome.point.coordinates);
             solution = problem.solve(&outcome.point);
         }
         let summary = summarise(&problem, &solution, &self.group.irradiance);
         let at_bound = problem.at_bound(&outcome.point, &solution.magnitudes);
-        let deviations = Deviations::new::<P>(M::LOBES, &solution, summary.chi2_reduced);
+        let shape = problem.shape(&outcome.point);
+        let deviations = Deviations::new(M::LOBES, &solution, &shape, summary.chi2_reduced);
         problem.give_back(&mut self.scratch);
 
         let channels = self.stack.channels;
@@ -145,17 +167,51 @@ impl<M: Model, const ISA: Isa, const C: usize, const P: usize> FitGroup for Join
                 row.fill(f32::NAN);
                 continue;
             }
-            write_row::<ISA, C, P>(
+            write_row(
                 Row::new(row),
                 [channels, M::LOBES, P - 2, ambients],
                 lane,
-                &outcome.point,
-                &solution,
+                &outcome.point.normal,
+                &array!(|i| shape[i].value),
+                &solution.magnitudes,
                 &summary,
                 &deviations,
             );
         }
     }
+}
+
+/// The best of the model's starting shapes at the best of some normals, which a model of one lobe chooses.
+#[inline(always)]
+fn start_of<M: Model<L>, const ISA: Isa, const L: usize>(
+    normals: &[[Lane<ISA>; 3]],
+    grey: &[Grey<ISA>],
+    illuminations: &[Illumination<Lane<ISA>>],
+    optics: &Optics,
+    ambient: bool,
+) -> Point<ISA> {
+    let found = start::<M::Seed, ISA>(normals, grey, illuminations, optics, ambient);
+    if L == 1 { found } else { start_at::<M, ISA, L>(found.normal, grey, illuminations, optics, ambient) }
+}
+
+/// The best of the points that a few steps from each of several starts lead to.
+#[inline(always)]
+fn explore<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize>(
+    problem: &mut Separable<'_, M, ISA, C, P, L>,
+    points: impl Iterator<Item = Point<ISA>>,
+    wanted: LaneMask,
+) -> Point<ISA> {
+    let mut best: Option<Outcome<Point<ISA>, ISA>> = None;
+    for point in points {
+        let mut found = minimise(problem, &point, wanted, EXPLORING_STEPS);
+        if let Some(best) = best {
+            let better = found.cost.lt(best.cost);
+            found.point = Separable::<M, ISA, C, P, L>::select(better, &found.point, &best.point);
+            found.cost = found.cost.min(best.cost);
+        }
+        best = Some(found);
+    }
+    best.expect("at least one start").point
 }
 
 struct Summary<const ISA: Isa> {
@@ -165,9 +221,9 @@ struct Summary<const ISA: Isa> {
 }
 
 #[inline(always)]
-fn summarise<M: Model, const ISA: Isa, const C: usize, const P: usize>(
-    problem: &Separable<'_, M, ISA, C, P>,
-    solution: &Solution<ISA, C, P>,
+fn summarise<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize>(
+    problem: &Separable<'_, M, ISA, C, P, L>,
+    solution: &Solution<ISA, C, P, L>,
     irradiance: &[[Lane<ISA>; C]],
 ) -> Summary<ISA> {
     let (zero, one) = (Lane::splat(0.0), Lane::splat(1.0));
@@ -192,14 +248,13 @@ fn summarise<M: Model, const ISA: Isa, const C: usize, const P: usize>(
 
 /// Standard deviations from the Fisher information at the solution. Where the residuals exceed the noise model they are
 /// raised by √χ²_reduced [Birge1932], for what the model does not describe is then the larger error.
-struct Deviations<const ISA: Isa, const C: usize> {
+struct Deviations<const ISA: Isa, const C: usize, const L: usize> {
     /// Root mean square angle between the fitted and the true normal, radians.
     normal: Lane<ISA>,
-    /// Relative, for the parameters are fitted in their logarithm.
-    shape_relative: [Lane<ISA>; MAX_SHAPE],
+    shape: [Lane<ISA>; MAX_SHAPE],
     diffuse: [Lane<ISA>; C],
     ambient: [Lane<ISA>; C],
-    specular: [Lane<ISA>; MAX_LOBES],
+    specular: [Lane<ISA>; L],
 }
 
 #[inline(always)]
@@ -207,9 +262,15 @@ fn deviation<const ISA: Isa>(variance: Lane<ISA>, birge: Lane<ISA>) -> Lane<ISA>
     (variance * birge).max(Lane::splat(0.0)).sqrt()
 }
 
-impl<const ISA: Isa, const C: usize> Deviations<ISA, C> {
+impl<const ISA: Isa, const C: usize, const L: usize> Deviations<ISA, C, L> {
+    /// `shape` with its derivatives by the coordinates.
     #[inline(always)]
-    fn new<const P: usize>(lobes: usize, solution: &Solution<ISA, C, P>, chi2_reduced: Lane<ISA>) -> Self {
+    fn new<const P: usize>(
+        lobes: usize,
+        solution: &Solution<ISA, C, P, L>,
+        shape: &[Dual<Lane<ISA>, P>; MAX_SHAPE],
+        chi2_reduced: Lane<ISA>,
+    ) -> Self {
         let zero = Lane::splat(0.0);
         let birge = chi2_reduced.max(Lane::splat(1.0));
         let mut hessian = solution.quadratic.hessian;
@@ -221,23 +282,25 @@ impl<const ISA: Isa, const C: usize> Deviations<ISA, C> {
         let covariance = inverse(&hessian);
         let mut result = Deviations {
             normal: deviation(covariance[0][0] + covariance[1][1], birge),
-            shape_relative: [zero; MAX_SHAPE],
+            shape: [zero; MAX_SHAPE],
             diffuse: [zero; C],
             ambient: [zero; C],
-            specular: [zero; MAX_LOBES],
+            specular: [zero; L],
         };
         for i in 0..P - 2 {
-            // A parameter that nothing depends on has an entry of 0 and is known not at all.
-            let variance = covariance[2 + i][2 + i];
-            result.shape_relative[i] =
-                Lane::select(variance.positive(), deviation(variance, birge), Lane::splat(f64::from(f32::INFINITY)));
+            result.shape[i] = deviation(propagated(shape[i].derivative, &covariance), birge);
+            for p in 2..P {
+                // A coordinate that nothing depends on has an entry of 0 and is known not at all.
+                let unknown = !covariance[p][p].positive() & shape[i].derivative[p].abs().positive();
+                result.shape[i] = Lane::select(unknown, Lane::splat(f64::from(f32::INFINITY)), result.shape[i]);
+            }
         }
         let variances = solution.magnitude_variances(lobes, &covariance);
         for k in 0..C {
             result.diffuse[k] = deviation(variances.diffuse[k], birge);
             result.ambient[k] = deviation(variances.ambient[k], birge);
         }
-        for j in 0..MAX_LOBES {
+        for j in 0..L {
             result.specular[j] = deviation(variances.specular[j], birge);
         }
         result
@@ -245,27 +308,26 @@ impl<const ISA: Isa, const C: usize> Deviations<ISA, C> {
 }
 
 #[inline(always)]
-fn write_row<const ISA: Isa, const C: usize, const P: usize>(
+fn write_row<const ISA: Isa, const C: usize, const L: usize>(
     mut row: Row,
     [channels, lobes, shapes, ambient]: [usize; 4],
     lane: usize,
-    point: &Point<ISA>,
-    solution: &Solution<ISA, C, P>,
+    normal: &[Lane<ISA>; 3],
+    shape: &[Lane<ISA>; MAX_SHAPE],
+    magnitudes: &Magnitudes<ISA, C, L>,
     summary: &Summary<ISA>,
-    deviations: &Deviations<ISA, C>,
+    deviations: &Deviations<ISA, C, L>,
 ) {
-    let magnitudes = &solution.magnitudes;
-    let shape: [f32; MAX_SHAPE] = array!(|i| point.shape_log[i].0[lane].exp());
-    row.extend(point.normal.iter().map(|x| x.0[lane]));
+    row.extend(normal.iter().map(|x| x.0[lane]));
     row.extend(magnitudes.diffuse[..channels].iter().map(|x| x.0[lane]));
     row.extend(magnitudes.specular[..lobes].iter().map(|x| x.0[lane]));
-    row.extend(shape[..shapes].iter().copied());
+    row.extend(shape[..shapes].iter().map(|x| x.0[lane]));
     row.extend(magnitudes.ambient[..ambient].iter().map(|x| x.0[lane]));
     row.push(summary.chi2_reduced.0[lane]);
     row.push(summary.residual_rms.0[lane]);
     row.push(deviations.normal.0[lane]);
     row.extend(deviations.diffuse[..channels].iter().map(|x| x.0[lane]));
     row.extend(deviations.specular[..lobes].iter().map(|x| x.0[lane]));
-    row.extend((0..shapes).map(|i| shape[i] * deviations.shape_relative[i].0[lane]));
+    row.extend(deviations.shape[..shapes].iter().map(|x| x.0[lane]));
     row.extend(deviations.ambient[..ambient].iter().map(|x| x.0[lane]));
 }

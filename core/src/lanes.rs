@@ -212,12 +212,12 @@ mod vector {
 pub fn outlined<const ISA: Isa, T>(function: impl FnOnce() -> T) -> T {
     #[cfg(target_arch = "x86_64")]
     {
-        #[inline(never)]
+        #[inline]
         #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma")]
         fn wide<T>(function: impl FnOnce() -> T) -> T {
             function()
         }
-        #[inline(never)]
+        #[inline]
         #[target_feature(enable = "avx2,fma")]
         fn fused<T>(function: impl FnOnce() -> T) -> T {
             function()
@@ -229,7 +229,7 @@ pub fn outlined<const ISA: Isa, T>(function: impl FnOnce() -> T) -> T {
             _ => {}
         }
     }
-    #[inline(never)]
+    #[inline]
     fn plain<T>(function: impl FnOnce() -> T) -> T {
         function()
     }

@@ -40,11 +40,28 @@ pub struct Stack<'a> {
     /// (light, pixel): nonzero leaves a sample out.
     pub sample_mask: Option<&'a [u8]>,
     pub noise: Noise,
+    /// (pixel, 3): the normals, where the surface is known; they are then not fitted, and nothing else is assumed of the
+    /// material either: the weak priors are off.
+    pub normal: Option<&'a [f32]>,
 }
 
 impl Stack<'_> {
     pub fn near(&self) -> bool {
         self.camera.near() || self.lights.iter().any(Place::near)
+    }
+
+    /// The pixels of a group from `start` on; past the end of the tile the last one is repeated.
+    #[inline(always)]
+    fn group(&self, start: usize) -> [usize; LANES] {
+        array!(|i| (start + i).min(self.pixels - 1))
+    }
+
+    /// The normals of a group of pixels from `start` on, where the surface is known.
+    #[inline(always)]
+    pub fn known_normal<const ISA: Isa>(&self, start: usize) -> Option<[Lane<ISA>; 3]> {
+        let normal = self.normal?;
+        let pixel = self.group(start);
+        Some(array!(|axis| Lane(array!(|i| normal[3 * pixel[i] + axis]))))
     }
 
     /// The samples of one light at a group of pixels, per channel, as stored.
@@ -134,10 +151,10 @@ impl<const ISA: Isa, const C: usize> Group<ISA, C> {
         }
     }
 
-    /// Reads the a group of pixels from `start` on; past the end of the tile the last pixel is repeated.
+    /// Reads a group of pixels from `start` on.
     #[inline(always)]
     pub fn gather(&mut self, stack: &Stack, start: usize) {
-        let pixel: [usize; LANES] = array!(|i| (start + i).min(stack.pixels - 1));
+        let pixel = stack.group(start);
         if let (true, Some(position)) = (stack.near(), stack.position_mm) {
             let x_mm = Lane(array!(|i| position[2 * pixel[i]]));
             let y_mm = Lane(array!(|i| position[2 * pixel[i] + 1]));

@@ -14,7 +14,8 @@ use crate::number::{Number, Real, array};
 use crate::observations::{Group, Stack};
 use crate::paper_shape::{Remainder, ShapeFit, Tilts};
 use crate::record::{FitGroup, Layout, Row, Status};
-use crate::separable::{Loss, Point, Scratch, Separable};
+use crate::robust::Loss;
+use crate::separable::{Point, Scratch, Separable};
 use crate::start::{Grey, diffuse_normal, grey};
 use std::marker::PhantomData;
 
@@ -35,6 +36,7 @@ pub struct Sample {
 struct UniformAmbient;
 
 impl Model for UniformAmbient {
+    type Seed = Self;
     const SHAPE: &'static [ShapeParameter] = &[];
     const LOBES: usize = 1;
     const RECIPROCAL: bool = true;
@@ -55,8 +57,8 @@ impl Model for UniformAmbient {
     }
 
     #[inline(always)]
-    fn specular_scale<N: Number>(_shape: &[N]) -> N {
-        N::splat(1.0)
+    fn specular_scale<N: Number>(_shape: &[N]) -> [N; 1] {
+        [N::splat(1.0)]
     }
 }
 
@@ -147,7 +149,7 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
     fn fit_diffuse<D: Model>(&mut self, colour: [Lane<ISA>; C]) -> Diffuse<ISA, C> {
         let begin = Point {
             normal: diffuse_normal(&self.grey, &self.far.illuminations, 1),
-            shape_log: [Lane::splat(0.0); MAX_SHAPE],
+            coordinates: [Lane::splat(0.0); MAX_SHAPE],
         };
         let unknowns = 3 + usize::from(self.options.ambient);
         let enough = !self.far.usable_lights.lt(Lane::splat(unknowns as f64));
@@ -224,7 +226,7 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
         Shape {
             normal: outcome.point.normal,
             magnitude: solution.magnitudes.diffuse,
-            shape_log: outcome.point.shape_log[0],
+            shape_log: outcome.point.coordinates[0],
             view_tilt: Lane(array!(|i| view[0].0[i].atan2(view[2].0[i]))),
             cost: solution.quadratic.cost,
             converged: outcome.converged,

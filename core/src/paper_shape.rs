@@ -166,9 +166,9 @@ impl<'a, M: Model, const ISA: Isa> ShapeFit<'a, M, ISA> {
         let half = self.view.1 * Lane::splat(0.5);
         let away = Lane::select(half.lt(Lane::splat(0.0)), Lane::splat(1.0), Lane::splat(-1.0));
         let (shape, phi) = self.search(None, array!(|i| half + away * Lane::splat(PHI_STARTS[i])));
-        let mut shape_log = [Lane::splat(0.0); MAX_SHAPE];
-        shape_log[0] = shape;
-        Point { normal: normalise(self.normal(phi)), shape_log }
+        let mut coordinates = [Lane::splat(0.0); MAX_SHAPE];
+        coordinates[0] = shape;
+        Point { normal: normalise(self.normal(phi)), coordinates }
     }
 
     #[inline(always)]

@@ -9,7 +9,7 @@ use crate::observations::{Noise, Samples, Stack};
 use crate::paper::Sample;
 use crate::record::Layout;
 use crate::render::{Parameters, View};
-use crate::separable::Loss;
+use crate::robust::Loss;
 use crate::slopes;
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -143,11 +143,11 @@ fn fit<'py>(
     loss_scale: f32,
     max_steps: usize,
     paper: Option<(f64, f64, bool, Option<[f64; 3]>)>,
-    normal: Option<[f64; 3]>,
+    normal: Option<PyReadonlyArray2<f32>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (name, ambient) = parse_model(model)?;
     let optics = parse_optics(index, fresnel)?;
-    let options = Options { optics, loss: parse_loss(loss, loss_scale)?, max_steps, ambient, normal };
+    let options = Options { optics, loss: parse_loss(loss, loss_scale)?, max_steps, ambient };
     let as_u16 = radiance.extract::<PyReadonlyArray3<u16>>().ok();
     let as_f32 = radiance.extract::<PyReadonlyArray3<f32>>().ok();
     let (shape, samples) = match (&as_u16, &as_f32) {
@@ -168,6 +168,9 @@ fn fit<'py>(
     if let Some(mask) = &sample_mask {
         check("sample_mask", mask.len(), lights * pixels)?;
     }
+    if let Some(normal) = &normal {
+        check("normal", normal.len(), 3 * pixels)?;
+    }
     let stack = Stack {
         samples,
         pixels,
@@ -182,6 +185,7 @@ fn fit<'py>(
         shadow_level,
         sample_mask: sample_mask.as_ref().map(|array| array.as_slice()).transpose()?,
         noise: Noise { read: noise.0, photon: noise.1, relative: noise.2 },
+        normal: normal.as_ref().map(|array| array.as_slice()).transpose()?,
     };
     if stack.near() {
         let Some(position) = stack.position_mm else {

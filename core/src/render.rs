@@ -32,7 +32,7 @@ pub struct View<'a> {
 
 /// Renders pixels `first..first + LANES` into `radiance`, shape (pixel, channel). Missing parameters give missing radiance.
 #[inline(always)]
-pub fn render_group<M: Model, const ISA: Isa>(
+pub fn render_group<M: Model<L>, const ISA: Isa, const L: usize>(
     parameters: &Parameters,
     view: &View,
     optics: &Optics,

@@ -9,49 +9,39 @@ use crate::dual::Dual;
 use crate::geometry::{Illumination, normalise, tangents};
 use crate::lanes::{Isa, Lane, LaneMask, outlined};
 use crate::minimise::{Objective, Quadratic};
-use crate::models::{Basis, MAX_LOBES, MAX_SHAPE, Model, Optics};
+use crate::models::{Basis, MAX_SHAPE, Model, Optics};
 use crate::number::{Mask, Number, Real, array};
 use crate::observations::{Group, Observation};
+use crate::robust::{Loss, Robust};
 use std::marker::PhantomData;
 
 /// Normals may tilt up to 84° from the painting's normal: beyond that no camera in front sees the element.
 pub const NORMAL_Z_MIN: f64 = 0.1;
 /// A step turns the normal by at most this angle in radians …
 const TURN_MAX: f64 = 0.5;
-/// … and changes the logarithm of a shape parameter by at most this.
+/// … and changes a coordinate of the shape by at most this.
 const SHAPE_STEP_MAX: f64 = 1.2;
 
-/// How residuals far outside the noise are treated.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Loss {
-    /// Plain least squares.
-    Linear,
-    /// ρ(r²) = k² ln(1 + r²/k²).
-    Cauchy(f32),
-    /// ρ(r²) = r² up to k, then 2 k |r| − k².
-    Huber(f32),
-}
-
-/// Normal and logarithms of the shape parameters.
+/// Normal and coordinates of the shape.
 #[derive(Clone, Copy)]
 pub struct Point<const ISA: Isa> {
     pub normal: [Lane<ISA>; 3],
-    pub shape_log: [Lane<ISA>; MAX_SHAPE],
+    pub coordinates: [Lane<ISA>; MAX_SHAPE],
 }
 
 /// P is 2 + the number of shape parameters.
-pub struct Separable<'a, M, const ISA: Isa, const C: usize, const P: usize> {
+pub struct Separable<'a, M, const ISA: Isa, const C: usize, const P: usize, const L: usize = 1> {
     pub observations: &'a [Observation<ISA, C>],
     pub illuminations: &'a [Illumination<Lane<ISA>>],
     colour: [Lane<ISA>; C],
     optics: Optics,
-    loss: Loss,
+    pub robust: Robust<ISA, C>,
     pub ambient: bool,
     pub channels: usize,
     /// Whether the normal keeps its place.
     pub hold_normal: bool,
     /// Specular magnitude where it is known beforehand, as one value for a whole sample.
-    pub fixed_specular: Option<[Lane<ISA>; MAX_LOBES]>,
+    pub fixed_specular: Option<[Lane<ISA>; L]>,
     /// Whether weak priors stand in for highlights that no light has shown.
     pub prior: bool,
     /// 1 / degrees of freedom.
@@ -59,42 +49,41 @@ pub struct Separable<'a, M, const ISA: Isa, const C: usize, const P: usize> {
     /// χ² per degree of freedom at the accepted point and at the one looked at last: the scale of the noise.
     noise_scale: Lane<ISA>,
     trial_noise_scale: Lane<ISA>,
-    /// The loss takes residuals this many times larger for noise.
-    loss_scale: Lane<ISA>,
-    /// Factor of each sample's weight from the robust loss, refreshed at every accepted point.
-    robust: Vec<[Lane<ISA>; C]>,
-    basis: Vec<Basis<Dual<Lane<ISA>, P>>>,
+    basis: Vec<Basis<Dual<Lane<ISA>, P>, L>>,
     model: PhantomData<M>,
 }
 
 /// Buffers with one entry per light, handed from group to group.
-pub struct Scratch<const ISA: Isa, const C: usize, const P: usize> {
+pub struct Scratch<const ISA: Isa, const C: usize, const P: usize, const L: usize = 1> {
     robust: Vec<[Lane<ISA>; C]>,
-    basis: Vec<Basis<Dual<Lane<ISA>, P>>>,
+    basis: Vec<Basis<Dual<Lane<ISA>, P>, L>>,
 }
 
-impl<const ISA: Isa, const C: usize, const P: usize> Scratch<ISA, C, P> {
+impl<const ISA: Isa, const C: usize, const P: usize, const L: usize> Scratch<ISA, C, P, L> {
     pub fn new(lights: usize) -> Self {
         let zero = Dual::constant(Lane::splat(0.0));
         Scratch {
             robust: vec![[Lane::splat(1.0); C]; lights],
-            basis: vec![Basis { diffuse: zero, specular: [zero; MAX_LOBES] }; lights],
+            basis: vec![Basis { diffuse: zero, specular: [zero; L] }; lights],
         }
     }
 }
 
 /// A point's magnitudes and everything that uncertainties are made from.
-pub struct Solution<const ISA: Isa, const C: usize, const P: usize> {
+pub struct Solution<const ISA: Isa, const C: usize, const P: usize, const L: usize = 1> {
     pub quadratic: Quadratic<ISA, P>,
-    pub magnitudes: Magnitudes<ISA, C>,
-    pub factored: Factored<ISA, C>,
+    pub magnitudes: Magnitudes<ISA, C, L>,
+    pub factored: Factored<ISA, C, L>,
     /// For each nonlinear parameter, how the magnitudes follow it: −∂(magnitudes)/∂(parameter).
-    pub following: [Magnitudes<ISA, C>; P],
+    pub following: [Magnitudes<ISA, C, L>; P],
 }
 
 /// sᵀ Σ s: the variance of a quantity with slopes s along parameters of covariance Σ.
 #[inline(always)]
-fn propagated<const ISA: Isa, const P: usize>(slopes: [Lane<ISA>; P], covariance: &[[Lane<ISA>; P]; P]) -> Lane<ISA> {
+pub fn propagated<const ISA: Isa, const P: usize>(
+    slopes: [Lane<ISA>; P],
+    covariance: &[[Lane<ISA>; P]; P],
+) -> Lane<ISA> {
     let mut sum = Lane::splat(0.0);
     for p in 0..P {
         for q in 0..P {
@@ -104,11 +93,11 @@ fn propagated<const ISA: Isa, const P: usize>(slopes: [Lane<ISA>; P], covariance
     sum
 }
 
-impl<const ISA: Isa, const C: usize, const P: usize> Solution<ISA, C, P> {
+impl<const ISA: Isa, const C: usize, const P: usize, const L: usize> Solution<ISA, C, P, L> {
     /// Marginal variances of the magnitudes, from the covariance of the nonlinear parameters: those of the linear problem
     /// at a known normal and shape, plus what follows from not knowing these.
     #[inline(always)]
-    pub fn magnitude_variances(&self, lobes: usize, covariance: &[[Lane<ISA>; P]; P]) -> Magnitudes<ISA, C> {
+    pub fn magnitude_variances(&self, lobes: usize, covariance: &[[Lane<ISA>; P]; P]) -> Magnitudes<ISA, C, L> {
         let one = Lane::splat(1.0);
         let mut variances = Magnitudes::zero();
         for k in 0..C {
@@ -133,7 +122,7 @@ impl<const ISA: Isa, const C: usize, const P: usize> Solution<ISA, C, P> {
     }
 }
 
-impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a, M, ISA, C, P> {
+impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize> Separable<'a, M, ISA, C, P, L> {
     /// The problem of one group, with buffers that `give_back` returns.
     #[inline(always)]
     pub fn new(
@@ -142,21 +131,16 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
         optics: Optics,
         loss: Loss,
         ambient: bool,
-        scratch: &mut Scratch<ISA, C, P>,
+        scratch: &mut Scratch<ISA, C, P, L>,
     ) -> Self {
         let unknowns = P + M::LOBES + group.channels * (1 + usize::from(ambient));
         let freedom = group.usable_samples - Lane::splat(unknowns as f64);
-        let mut robust = std::mem::take(&mut scratch.robust);
-        if loss != Loss::Linear {
-            robust.fill([Lane::splat(1.0); C]);
-        }
         Separable {
             observations: &group.observations,
             illuminations: &group.illuminations,
             colour,
             optics,
-            loss,
-            loss_scale: Lane::splat(1.0),
+            robust: Robust::new(loss, std::mem::take(&mut scratch.robust)),
             ambient,
             channels: group.channels,
             fixed_specular: None,
@@ -165,7 +149,6 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
             noise_scale: Lane::splat(1.0),
             trial_noise_scale: Lane::splat(1.0),
             per_freedom: Lane::splat(1.0) / freedom.max(Lane::splat(1.0)),
-            robust,
             basis: std::mem::take(&mut scratch.basis),
             model: PhantomData,
         }
@@ -173,8 +156,8 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
 
     /// Returns the buffers for the next group.
     #[inline(always)]
-    pub fn give_back(self, scratch: &mut Scratch<ISA, C, P>) {
-        (scratch.robust, scratch.basis) = (self.robust, self.basis);
+    pub fn give_back(self, scratch: &mut Scratch<ISA, C, P, L>) {
+        (scratch.robust, scratch.basis) = (self.robust.into_factors(), self.basis);
     }
 
     #[inline(always)]
@@ -184,14 +167,10 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
 
     #[inline(always)]
     fn weight(&self, light: usize) -> [Lane<ISA>; C] {
-        let weight = self.observations[light].weight;
-        if self.loss == Loss::Linear {
-            return weight;
-        }
-        array!(|k| weight[k] * self.robust[light][k])
+        self.robust.weight(light, &self.observations[light].weight)
     }
 
-    /// The basis functions at a point, with their derivatives by (tangent, tangent, ln shape …).
+    /// The basis functions at a point, with their derivatives by (tangent, tangent, coordinates of the shape).
     #[inline(always)]
     fn evaluate_basis(&mut self, point: &Point<ISA>) {
         let (mut first, mut second) = tangents(point.normal);
@@ -204,18 +183,14 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
             component.derivative[1] = second[i];
             component
         });
-        let mut shape = [Dual::constant(Lane::splat(0.0)); MAX_SHAPE];
-        for i in 0..P - 2 {
-            let value = point.shape_log[i].exp();
-            shape[i] = Dual::parameter(value, 2 + i, value);
-        }
+        let shape = self.shape(point);
         for (basis, at) in self.basis.iter_mut().zip(self.illuminations) {
             *basis = M::basis(normal, &shape[..P - 2], at, &self.optics);
         }
     }
 
     #[inline(always)]
-    fn lobe_sum(&self, magnitudes: &Magnitudes<ISA, C>, light: usize) -> Dual<Lane<ISA>, P> {
+    fn lobe_sum(&self, magnitudes: &Magnitudes<ISA, C, L>, light: usize) -> Dual<Lane<ISA>, P> {
         let mut sum = Dual::constant(Lane::splat(0.0));
         for j in 0..M::LOBES {
             sum = self.basis[light].specular[j].scale_add(magnitudes.specular[j], sum);
@@ -225,7 +200,7 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
 
     /// Solves for the magnitudes at a point, then takes the cost and its derivatives there.
     #[inline(always)]
-    pub fn solve(&mut self, point: &Point<ISA>) -> Solution<ISA, C, P> {
+    pub fn solve(&mut self, point: &Point<ISA>) -> Solution<ISA, C, P, L> {
         outlined::<ISA, _>(
             #[inline(always)]
             || self.solve_inline(point),
@@ -233,7 +208,7 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
     }
 
     #[inline(always)]
-    fn solve_inline(&mut self, point: &Point<ISA>) -> Solution<ISA, C, P> {
+    fn solve_inline(&mut self, point: &Point<ISA>) -> Solution<ISA, C, P, L> {
         self.evaluate_basis(point);
         let zero = Lane::splat(0.0);
         let lobes = self.free_lobes();
@@ -252,11 +227,11 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
             let specular = array!(|j| basis.specular[j].value);
             arrow.add(lobes, basis.diffuse.value, &specular, &radiance, &self.weight(light), &self.colour);
         }
-        let specular_scale = self.specular_scale(point);
-        let ridge = self.noise_scale / (specular_scale.value * specular_scale.value);
+        let specular_scale = M::specular_scale(&self.shape(point)[..P - 2]);
+        let ridge: [Lane<ISA>; L] = array!(|j| self.noise_scale / specular_scale[j].value.squared());
         if self.prior {
             for j in 0..lobes {
-                arrow.add_ridge(j, ridge);
+                arrow.add_ridge(j, ridge[j]);
             }
         }
         let (mut magnitudes, factored) = arrow.magnitudes(lobes);
@@ -282,7 +257,7 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
                 if M::LOBES > 0 {
                     residual = residual - self.colour[k] * sum.value;
                 }
-                quadratic.cost = quadratic.cost + self.cost_of(weight[k], observation.weight[k], residual);
+                quadratic.cost = quadratic.cost + self.robust.cost(weight[k], observation.weight[k], residual);
                 let weighted_residual = weight[k] * residual;
                 let mut weighted_slope = [zero; P];
                 let mut slope = [zero; P];
@@ -333,10 +308,10 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
             self.add_shape_prior(point, &mut quadratic);
             // The other half of the ridge on the specular magnitudes: their scale follows the shape.
             for j in 0..lobes {
-                let term = ridge * magnitudes.specular[j] * magnitudes.specular[j];
+                let term = ridge[j] * magnitudes.specular[j] * magnitudes.specular[j];
                 quadratic.cost = quadratic.cost + term;
                 for p in 2..P {
-                    let slope = specular_scale.derivative[p] / specular_scale.value;
+                    let slope = specular_scale[j].derivative[p] / specular_scale[j].value;
                     quadratic.descent[p] = term.mul_add(slope, quadratic.descent[p]);
                 }
             }
@@ -344,14 +319,14 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
         Solution { quadratic, magnitudes, factored, following }
     }
 
+    /// The shape at a point, with its derivatives by the coordinates.
     #[inline(always)]
-    fn specular_scale(&self, point: &Point<ISA>) -> Dual<Lane<ISA>, P> {
-        let mut shape = [Dual::constant(Lane::splat(0.0)); MAX_SHAPE];
+    pub fn shape(&self, point: &Point<ISA>) -> [Dual<Lane<ISA>, P>; MAX_SHAPE] {
+        let mut coordinates = [Dual::constant(Lane::splat(0.0)); MAX_SHAPE];
         for i in 0..P - 2 {
-            let value = point.shape_log[i].exp();
-            shape[i] = Dual::parameter(value, 2 + i, value);
+            coordinates[i] = Dual::parameter(point.coordinates[i], 2 + i, Lane::splat(1.0));
         }
-        M::specular_scale(&shape[..P - 2])
+        M::shape(coordinates)
     }
 
     /// A weak prior on the shape, which decides only where no highlight was seen: without it a lobe too narrow to fall on any
@@ -362,37 +337,18 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
     #[inline(always)]
     fn add_shape_prior(&self, point: &Point<ISA>, quadratic: &mut Quadratic<ISA, P>) {
         for i in 0..P - 2 {
-            let (median, deviation) = M::SHAPE[i].prior;
+            let (mean, deviation) = M::coordinate(i).prior;
             let weight = self.trial_noise_scale * Lane::splat(1.0 / (deviation * deviation));
-            let distance = Lane::splat(median.ln()) - point.shape_log[i];
+            let distance = Lane::splat(mean) - point.coordinates[i];
             quadratic.cost = (weight * distance).mul_add(distance, quadratic.cost);
             quadratic.descent[2 + i] = weight.mul_add(distance, quadratic.descent[2 + i]);
             quadratic.hessian[2 + i][2 + i] = quadratic.hessian[2 + i][2 + i] + weight;
         }
     }
 
-    /// ρ of a residual; `weight` includes the robust factor, `plain` does not.
-    #[inline(always)]
-    fn cost_of(&self, weight: Lane<ISA>, plain: Lane<ISA>, residual: Lane<ISA>) -> Lane<ISA> {
-        match self.loss {
-            Loss::Linear => weight * residual * residual,
-            Loss::Cauchy(k) => {
-                let k = self.loss_scale * Lane::splat(f64::from(k));
-                let k_squared = k * k;
-                k_squared * (plain * residual * residual / k_squared).ln_1p()
-            }
-            Loss::Huber(k) => {
-                let k = self.loss_scale * Lane::splat(f64::from(k));
-                let squared = plain * residual * residual;
-                let linear = (k + k) * squared.sqrt() - k * k;
-                Lane::select(squared.lt(k * k), squared, linear)
-            }
-        }
-    }
-
     /// The radiance that the model gives at a light, per unit of irradiance.
     #[inline(always)]
-    pub fn predicted(&self, magnitudes: &Magnitudes<ISA, C>, light: usize) -> [Lane<ISA>; C] {
+    pub fn predicted(&self, magnitudes: &Magnitudes<ISA, C, L>, light: usize) -> [Lane<ISA>; C] {
         let sum = self.lobe_sum(magnitudes, light).value;
         array!(|k| {
             let diffuse = magnitudes.diffuse[k].mul_add(self.basis[light].diffuse.value, magnitudes.ambient[k]);
@@ -400,68 +356,41 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
         })
     }
 
-    /// Robust factors from the residuals at a point: iteratively reweighted least squares.
+    /// The radiance that the model leaves over at a light.
     #[inline(always)]
-    fn reweight(&mut self, magnitudes: &Magnitudes<ISA, C>, mask: LaneMask) {
-        let one = Lane::splat(1.0);
-        let scale_squared = self.loss_scale * self.loss_scale;
-        for (light, observation) in self.observations.iter().enumerate() {
-            let predicted = self.predicted(magnitudes, light);
-            for k in 0..C {
-                let residual = observation.radiance[k] - predicted[k];
-                let squared = observation.weight[k] * residual * residual;
-                let factor = match self.loss {
-                    Loss::Linear => one,
-                    Loss::Cauchy(k) => one / (one + squared / (Lane::splat(f64::from(k * k)) * scale_squared)),
-                    Loss::Huber(k) => (Lane::splat(f64::from(k)) * self.loss_scale / squared.sqrt()).min(one),
-                };
-                self.robust[light][k] = Lane::select(mask, factor, self.robust[light][k]);
-            }
-        }
-    }
-
-    /// Gives the samples of each light only a share of their weight, until the loss has residuals to go by.
-    #[inline(always)]
-    pub fn trust(&mut self, share: &[Lane<ISA>]) {
-        for (robust, share) in self.robust.iter_mut().zip(share) {
-            *robust = [*share; C];
-        }
+    fn residual(&self, magnitudes: &Magnitudes<ISA, C, L>, light: usize) -> [Lane<ISA>; C] {
+        let predicted = self.predicted(magnitudes, light);
+        array!(|k| self.observations[light].radiance[k] - predicted[k])
     }
 
     /// Sets the scale of the loss to the residuals' own at a point, by the samples that are trusted there, or back to 1.
     #[inline(always)]
     pub fn scale_loss(&mut self, point: Option<&Point<ISA>>) {
-        let one = Lane::splat(1.0);
-        self.loss_scale = one;
+        self.robust.set_scale(Lane::splat(1.0));
         let Some(point) = point else { return };
         let magnitudes = self.solve(point).magnitudes;
         let (mut squares, mut trusted) = (Lane::splat(0.0), Lane::splat(1e-20));
         for (light, observation) in self.observations.iter().enumerate() {
-            let predicted = self.predicted(&magnitudes, light);
-            for k in 0..C {
-                let share = Lane::select(observation.weight[k].positive(), self.robust[light][k], Lane::splat(0.0));
-                let residual = observation.radiance[k] - predicted[k];
-                squares = (share * observation.weight[k] * residual).mul_add(residual, squares);
-                trusted = trusted + share;
-            }
+            let sums = self.robust.trusted(light, &observation.weight, &self.residual(&magnitudes, light));
+            (squares, trusted) = (squares + sums.0, trusted + sums.1);
         }
-        self.loss_scale = (squares / trusted).sqrt().max(one);
+        self.robust.set_scale((squares / trusted).sqrt());
     }
 
     #[inline(always)]
-    fn shape_bounds(index: usize) -> (Lane<ISA>, Lane<ISA>) {
-        let parameter = M::SHAPE[index];
-        (Lane::splat(parameter.lower.ln()), Lane::splat(parameter.upper.ln()))
+    fn bounds(index: usize) -> (Lane<ISA>, Lane<ISA>) {
+        let coordinate = M::coordinate(index);
+        (Lane::splat(coordinate.lower), Lane::splat(coordinate.upper))
     }
 
     /// Lanes with a parameter or a magnitude at its bound.
     #[inline(always)]
-    pub fn at_bound(&self, point: &Point<ISA>, magnitudes: &Magnitudes<ISA, C>) -> LaneMask {
+    pub fn at_bound(&self, point: &Point<ISA>, magnitudes: &Magnitudes<ISA, C, L>) -> LaneMask {
         let zero = Lane::splat(0.0);
         let mut bound = !point.normal[2].gt(Lane::splat(NORMAL_Z_MIN * 1.001));
         for i in 0..P - 2 {
-            let (lower, upper) = Self::shape_bounds(i);
-            bound = bound | !point.shape_log[i].gt(lower) | !point.shape_log[i].lt(upper);
+            let (lower, upper) = Self::bounds(i);
+            bound = bound | !point.coordinates[i].gt(lower) | !point.coordinates[i].lt(upper);
         }
         for k in 0..self.channels {
             bound = bound | !magnitudes.diffuse[k].gt(zero);
@@ -473,7 +402,9 @@ impl<'a, M: Model, const ISA: Isa, const C: usize, const P: usize> Separable<'a,
     }
 }
 
-impl<M: Model, const ISA: Isa, const C: usize, const P: usize> Objective<ISA, P> for Separable<'_, M, ISA, C, P> {
+impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize> Objective<ISA, P>
+    for Separable<'_, M, ISA, C, P, L>
+{
     type Point = Point<ISA>;
 
     #[inline(always)]
@@ -489,14 +420,14 @@ impl<M: Model, const ISA: Isa, const C: usize, const P: usize> Objective<ISA, P>
         let mut turned: [Lane<ISA>; 3] =
             array!(|i| point.normal[i] + shorten * (step[0] * first[i] + step[1] * second[i]));
         turned[2] = turned[2].max(Lane::splat(NORMAL_Z_MIN));
-        let mut shape_log = point.shape_log;
+        let mut coordinates = point.coordinates;
         for i in 0..P - 2 {
-            let (lower, upper) = Self::shape_bounds(i);
+            let (lower, upper) = Self::bounds(i);
             let limit = Lane::splat(SHAPE_STEP_MAX);
             let change = step[2 + i].min(limit).max(-limit);
-            shape_log[i] = (shape_log[i] + change).max(lower).min(upper);
+            coordinates[i] = (coordinates[i] + change).max(lower).min(upper);
         }
-        Point { normal: normalise(turned), shape_log }
+        Point { normal: normalise(turned), coordinates }
     }
 
     #[inline(always)]
@@ -504,9 +435,9 @@ impl<M: Model, const ISA: Isa, const C: usize, const P: usize> Objective<ISA, P>
         let zero = Lane::splat(0.0);
         let mut blocked = [LaneMask::NONE; P];
         for i in 0..P - 2 {
-            let (lower, upper) = Self::shape_bounds(i);
-            let low = !point.shape_log[i].gt(lower) & descent[2 + i].lt(zero);
-            let high = !point.shape_log[i].lt(upper) & descent[2 + i].gt(zero);
+            let (lower, upper) = Self::bounds(i);
+            let low = !point.coordinates[i].gt(lower) & descent[2 + i].lt(zero);
+            let high = !point.coordinates[i].lt(upper) & descent[2 + i].gt(zero);
             blocked[2 + i] = low | high;
         }
         blocked
@@ -516,16 +447,19 @@ impl<M: Model, const ISA: Isa, const C: usize, const P: usize> Objective<ISA, P>
     fn select(mask: LaneMask, yes: &Point<ISA>, no: &Point<ISA>) -> Point<ISA> {
         Point {
             normal: array!(|i| Lane::select(mask, yes.normal[i], no.normal[i])),
-            shape_log: array!(|i| Lane::select(mask, yes.shape_log[i], no.shape_log[i])),
+            coordinates: array!(|i| Lane::select(mask, yes.coordinates[i], no.coordinates[i])),
         }
     }
 
     #[inline(always)]
     fn accepted(&mut self, point: &Point<ISA>, mask: LaneMask) {
         self.noise_scale = Lane::select(mask, self.trial_noise_scale, self.noise_scale);
-        if self.loss != Loss::Linear && mask.any() {
+        if !self.robust.is_linear() && mask.any() {
             let magnitudes = self.solve(point).magnitudes;
-            self.reweight(&magnitudes, mask);
+            for (light, observation) in self.observations.iter().enumerate() {
+                let residual = self.residual(&magnitudes, light);
+                self.robust.reweight(light, &observation.weight, &residual, mask);
+            }
         }
     }
 }

@@ -20,10 +20,11 @@ pub struct View<'a> {
 }
 
 /// Basis functions times the light's fall-off, shape (pixel, light, 1 + lobes, 1 + P): each function's value, then its
-/// slopes by a turn of the normal along each of its two tangents, in radians, and by the logarithm of each shape parameter.
+/// slopes by a turn of the normal along each of its two tangents, in radians, and by the logarithm of each shape parameter, or
+/// by itself where it may be negative.
 ///
 /// P is 2 + the number of shape parameters.
-pub fn basis_slopes<M: Model, const P: usize>(view: &View, optics: &Optics) -> Vec<f64> {
+pub fn basis_slopes<M: Model<L>, const P: usize, const L: usize>(view: &View, optics: &Optics) -> Vec<f64> {
     let functions = 1 + M::LOBES;
     let width = view.lights.len() * functions * (1 + P);
     let mut slopes = vec![0.0; view.normal.len() / 3 * width];
@@ -43,7 +44,7 @@ pub fn basis_slopes<M: Model, const P: usize>(view: &View, optics: &Optics) -> V
         let mut shape = [Dual::<f64, P>::constant(1.0); MAX_SHAPE];
         for i in 0..P - 2 {
             let value = view.shape[pixel * (P - 2) + i];
-            shape[i] = Dual::parameter(value, 2 + i, value);
+            shape[i] = Dual::parameter(value, 2 + i, if M::SHAPE[i].logarithmic() { value } else { 1.0 });
         }
         let towards_camera = view.camera.seen_from(x_mm, y_mm).0;
         for (light, rows) in view.lights.iter().zip(rows.chunks_exact_mut(functions * (1 + P))) {

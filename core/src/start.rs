@@ -143,6 +143,17 @@ pub fn candidates<const ISA: Isa>(
     [diffuse_normal(grey, illuminations, 3), highlight_normal(grey, illuminations)]
 }
 
+/// Angles, in radians, by which normals are tried aside of the plane in which all lights lie. There the error is the same on
+/// both sides of a normal in the half vectors' own plane: a fit that starts in it has no slope to leave it by, and one that
+/// starts on one side seldom comes to the other.
+pub const ASIDE: [f64; 4] = [0.1, -0.1, 0.35, -0.35];
+
+/// The candidates, moved by an angle along `across`.
+#[inline(always)]
+pub fn aside<const ISA: Isa>(candidates: &[[Lane<ISA>; 3]; 2], across: [f64; 3], angle: f64) -> [[Lane<ISA>; 3]; 2] {
+    array!(|n| bounded(array!(|i| candidates[n][i] + Lane::splat(angle * across[i]))))
+}
+
 /// The best shape of the model's grid at the best of the candidate normals.
 #[inline(always)]
 pub fn start<M: Model, const ISA: Isa>(
@@ -188,7 +199,7 @@ fn start_inline<M: Model, const ISA: Isa>(
     let zero = Lane::splat(0.0);
     let one = Lane::splat(if ambient { 1.0 } else { 0.0 });
     let mut best_cost = Lane::splat(f64::from(f32::MAX));
-    let mut best = Point { normal: candidates[0], shape_log: [zero; MAX_SHAPE] };
+    let mut best = Point { normal: candidates[0], coordinates: [zero; MAX_SHAPE] };
     let mut free_normal = candidates[0];
     for &normal in candidates {
         let mut sums = FreeDiffuse { matrix: [[zero; 4]; 4], right: [zero; 4], data: zero };
@@ -235,16 +246,17 @@ fn start_inline<M: Model, const ISA: Isa>(
                 let free = diffuse[i] - magnitude * absorbed[i];
                 free_normal[i] = Lane::select(better, free, free_normal[i]);
             }
+            let coordinates = M::coordinates(shape);
             for i in 0..M::SHAPE.len() {
-                best.shape_log[i] = Lane::select(better, Lane::splat(shape[i].ln()), best.shape_log[i]);
+                best.coordinates[i] = Lane::select(better, Lane::splat(coordinates[i]), best.coordinates[i]);
             }
         }
     }
     // The lobe's normal or the diffuse term's: whichever serves both better.
     let free_normal = bounded(free_normal);
     let costs = [
-        one_normal_cost::<M, ISA>(best.normal, &best.shape_log, grey, illuminations, optics, ambient),
-        one_normal_cost::<M, ISA>(free_normal, &best.shape_log, grey, illuminations, optics, ambient),
+        one_normal_cost::<M, ISA, 1>(best.normal, &best.coordinates, grey, illuminations, optics, ambient),
+        one_normal_cost::<M, ISA, 1>(free_normal, &best.coordinates, grey, illuminations, optics, ambient),
     ];
     let better = costs[1].lt(costs[0]);
     best.normal = array!(|i| Lane::select(better, free_normal[i], best.normal[i]));
@@ -253,7 +265,7 @@ fn start_inline<M: Model, const ISA: Isa>(
 
 /// The best shape of the model's grid at a normal that is known, diffuse term and lobe alike.
 #[inline(always)]
-pub fn start_at<M: Model, const ISA: Isa>(
+pub fn start_at<M: Model<L>, const ISA: Isa, const L: usize>(
     normal: [Lane<ISA>; 3],
     grey: &[Grey<ISA>],
     illuminations: &[Illumination<Lane<ISA>>],
@@ -261,18 +273,26 @@ pub fn start_at<M: Model, const ISA: Isa>(
     ambient: bool,
 ) -> Point<ISA> {
     let mut best_cost = Lane::splat(f64::from(f32::MAX));
-    let mut best = Point { normal, shape_log: [Lane::splat(0.0); MAX_SHAPE] };
-    for shape in M::STARTS {
-        let shape_log: [Lane<ISA>; MAX_SHAPE] = array!(|i| Lane::splat(shape[i].max(1e-6).ln()));
+    let mut best = Point { normal, coordinates: [Lane::splat(0.0); MAX_SHAPE] };
+    for coordinates in starts::<M, ISA, L>() {
         let cost = outlined::<ISA, _>(
             #[inline(always)]
-            || one_normal_cost::<M, ISA>(normal, &shape_log, grey, illuminations, optics, ambient),
+            || one_normal_cost::<M, ISA, L>(normal, &coordinates, grey, illuminations, optics, ambient),
         );
         let better = cost.lt(best_cost);
         best_cost = Lane::select(better, cost, best_cost);
-        best.shape_log = array!(|i| Lane::select(better, shape_log[i], best.shape_log[i]));
+        best.coordinates = array!(|i| Lane::select(better, coordinates[i], best.coordinates[i]));
     }
     best
+}
+
+/// The coordinates of the model's grid of shapes.
+#[inline(always)]
+pub fn starts<M: Model<L>, const ISA: Isa, const L: usize>() -> impl Iterator<Item = [Lane<ISA>; MAX_SHAPE]> {
+    M::STARTS.iter().map(|shape| {
+        let coordinates = M::coordinates(shape);
+        array!(|i| Lane::splat(if i < M::SHAPE.len() { coordinates[i] } else { 0.0 }))
+    })
 }
 
 #[inline(always)]
@@ -286,17 +306,17 @@ fn product<const ISA: Isa, const N: usize>(a: &[Lane<ISA>; N], b: &[Lane<ISA>; N
 
 /// Least cost of a normal and a shape over all magnitudes that are not negative.
 #[inline(always)]
-fn one_normal_cost<M: Model, const ISA: Isa>(
+fn one_normal_cost<M: Model<L>, const ISA: Isa, const L: usize>(
     normal: [Lane<ISA>; 3],
-    shape_log: &[Lane<ISA>; MAX_SHAPE],
+    coordinates: &[Lane<ISA>; MAX_SHAPE],
     grey: &[Grey<ISA>],
     illuminations: &[Illumination<Lane<ISA>>],
     optics: &Optics,
     ambient: bool,
 ) -> Lane<ISA> {
     let one = [Lane::splat(1.0)];
-    let shape: [Lane<ISA>; MAX_SHAPE] = array!(|i| shape_log[i].exp());
-    let mut arrow = Arrow::<ISA, 1>::new(ambient);
+    let shape = M::shape(*coordinates);
+    let mut arrow = Arrow::<ISA, 1, L>::new(ambient);
     let mut data = Lane::splat(0.0);
     for (sample, at) in grey.iter().zip(illuminations) {
         let (radiance, weight) = ([sample.radiance], [sample.weight]);

@@ -29,7 +29,7 @@ def fit(
     loss_scale: float,
     max_steps: int,
     paper: tuple[float, float, bool, tuple[float, float, float] | None] | None = None,
-    normal: tuple[float, float, float] | None = None,
+    normal: NDArray[np.float32] | None = None,
 ) -> dict[str, NDArray[Any]]: ...
 def render(
     model: str,

@@ -231,7 +231,8 @@ def render_pixels(pixels: Pixels, lights: Lights, camera: Camera) -> NDArray[np.
         normal,
         pixels.diffuse,
         np.where(matte, np.float32(0.0), pixels.specular),
-        np.where(matte, np.float32(1.0), pixels.shape),
+        # Any shape will do for a lobe of no magnitude that is within the range of every parameter.
+        np.where(matte, np.float32(0.5), pixels.shape),
         pixels.ambient,
         view_tilt=view_tilt,
         light_direction=turn_about_z(lights.direction, -arm_azimuth),

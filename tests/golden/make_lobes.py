@@ -27,6 +27,7 @@ GEOMETRIES = [
 # Model, its shapes, index of refraction, Fresnel angle.
 SETTINGS = [
     ("lambert", [None], 1.5, "facet"),
+    ("oren-nayar", [0.05, 0.3, 0.8], 1.5, "facet"),
     ("phong", [1.0, 12.5, 800.0], 1.5, "facet"),
     ("torrance-sparrow", [0.02, 0.1, 0.4, 0.9], 1.5, "facet"),
     ("torrance-sparrow", [0.1, 0.4], 1.5, "element"),
@@ -35,9 +36,12 @@ SETTINGS = [
     ("torrance-sparrow-gaussian", [0.15], 1.5, "element"),
     ("torrance-sparrow-smith", [0.02, 0.1, 0.4, 0.9], 1.5, "facet"),
     ("torrance-sparrow-smith", [0.3], 1.33, "element"),
+    ("torrance-sparrow-2", [[0.03, 0.3], [0.1, 0.9], [0.25, 4.0]], 1.5, "facet"),
+    ("torrance-sparrow-2", [[0.1, 0.5]], 1.5, "element"),
     ("gtr", [[0.02, 1.5], [0.1, 0.8], [0.4, 2.0], [0.7, 5.0]], 1.5, "facet"),
     ("gtr", [[0.2, 1.2]], 1.5, "element"),
     ("ward", [0.03, 0.15, 0.6], 1.5, "facet"),
+    ("ward-anisotropic", [[0.05, 0.2, 0.0], [0.2, 0.1, 0.6], [0.5, 0.4, -0.8]], 1.5, "facet"),
 ]
 
 
@@ -65,7 +69,7 @@ def cases():
                     "light": light,
                     "view": view,
                     "diffuse_basis": float(diffuse),
-                    "specular_basis": float(specular),
+                    "specular_basis": specular.tolist(),
                 }
 
 

@@ -1,12 +1,13 @@
 //! Lambert's perfectly diffuse surface: Y = Ad max(0, n·l).
 
-use super::{Basis, MAX_LOBES, MAX_SHAPE, Model, Optics, ShapeParameter};
+use super::{Basis, MAX_SHAPE, Model, Optics, ShapeParameter};
 use crate::geometry::{Illumination, facing};
 use crate::number::Number;
 
 pub struct Lambert;
 
 impl Model for Lambert {
+    type Seed = Self;
     const SHAPE: &'static [ShapeParameter] = &[];
     const LOBES: usize = 0;
     const RECIPROCAL: bool = true;
@@ -23,11 +24,11 @@ impl Model for Lambert {
     fn basis<N: Number>(normal: [N; 3], _shape: &[N], at: &Illumination<N::Real>, _optics: &Optics) -> Basis<N> {
         let zero = N::splat(0.0);
         let (normal_light, _, visible) = facing(normal, at);
-        Basis { diffuse: N::select(visible, normal_light, zero), specular: [zero; MAX_LOBES] }
+        Basis { diffuse: N::select(visible, normal_light, zero), specular: [zero] }
     }
 
     #[inline(always)]
-    fn specular_scale<N: Number>(_shape: &[N]) -> N {
-        N::splat(1.0)
+    fn specular_scale<N: Number>(_shape: &[N]) -> [N; 1] {
+        [N::splat(1.0)]
     }
 }

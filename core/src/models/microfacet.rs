@@ -1,6 +1,6 @@
 //! Factors of a microfacet lobe: D, the distribution of facet slopes, and G, shadowing and masking.
 
-use super::ShapeParameter;
+use super::{Coordinate, MAX_SHAPE, ShapeParameter, plain_coordinate, plain_coordinates, plain_shape};
 use crate::geometry::Illumination;
 use crate::number::Number;
 
@@ -10,9 +10,22 @@ pub trait Distribution {
     const SHAPE: &'static [ShapeParameter];
     const TITLE: &'static str;
     const CITATION: &'static str;
-    const STARTS: &'static [[f64; super::MAX_SHAPE]];
+    const STARTS: &'static [[f64; MAX_SHAPE]];
     /// `chord_squared` is |n − h|² = 2 (1 − n·h).
     fn evaluate<N: Number>(shape: &[N], chord_squared: N) -> N;
+
+    // As the model's.
+    #[inline(always)]
+    fn shape<N: Number>(coordinates: [N; MAX_SHAPE]) -> [N; MAX_SHAPE] {
+        plain_shape(Self::SHAPE, coordinates)
+    }
+    fn coordinates(shape: &[f64; MAX_SHAPE]) -> [f64; MAX_SHAPE] {
+        plain_coordinates(Self::SHAPE, shape)
+    }
+    #[inline(always)]
+    fn coordinate(index: usize) -> Coordinate {
+        plain_coordinate(&Self::SHAPE[index])
+    }
 }
 
 /// [TrowbridgeReitz1975], [Chen2007] Eq. 3: D = [c² / ((n·h)² (c² − 1) + 1)]².
@@ -20,10 +33,12 @@ pub trait Distribution {
 /// c is the eccentricity of the ellipsoids, alpha in the form known as GGX: D = π α² D_GGX.
 pub struct TrowbridgeReitz;
 
-const ECCENTRICITY: ShapeParameter = ShapeParameter {
+/// Above 1 the ellipsoids are prolate: facets lean, and the lobe grows towards grazing angles. A paint's highlight has none
+/// of that, but light that returns from within some matte materials has.
+pub const ECCENTRICITY: ShapeParameter = ShapeParameter {
     name: "c",
     lower: 0.004,
-    upper: 1.0,
+    upper: 30.0,
     prior: (0.15, 1.2),
     meaning: "eccentricity of the facets' ellipsoids, small is glossy",
 };
@@ -40,7 +55,7 @@ impl Distribution for TrowbridgeReitz {
     const TITLE: &'static str = "Trowbridge-Reitz facets";
     const CITATION: &'static str = "TrowbridgeReitz1975";
     // Up to 0.9: with a grid that ends at 0.5 a fifth of the fits of c in 0.5 … 0.9 fail.
-    const STARTS: &'static [[f64; super::MAX_SHAPE]] = &[
+    const STARTS: &'static [[f64; MAX_SHAPE]] = &[
         [0.03, 0.0, 0.0],
         [0.06, 0.0, 0.0],
         [0.12, 0.0, 0.0],
@@ -70,14 +85,14 @@ impl Distribution for GeneralisedTrowbridgeReitz {
         ShapeParameter {
             name: "exponent",
             lower: 0.1,
-            upper: 300.0,
+            upper: 1000.0,
             prior: (2.0, 0.7),
             meaning: "of the facets' distribution: 2 is Trowbridge-Reitz, less has longer tails, many is a Gaussian",
         },
     ];
     const TITLE: &'static str = "generalised Trowbridge-Reitz facets";
     const CITATION: &'static str = "Burley2012";
-    const STARTS: &'static [[f64; super::MAX_SHAPE]] = &[
+    const STARTS: &'static [[f64; MAX_SHAPE]] = &[
         [0.08, 0.35, 0.0],
         [0.02, 0.9, 0.0],
         [0.06, 0.9, 0.0],
@@ -89,6 +104,7 @@ impl Distribution for GeneralisedTrowbridgeReitz {
         [0.9, 3.0, 0.0],
         // Nearly Gaussian.
         [0.8, 12.0, 0.0],
+        [0.98, 150.0, 0.0],
     ];
 
     #[inline(always)]
@@ -98,7 +114,39 @@ impl Distribution for GeneralisedTrowbridgeReitz {
         let x = sine_squared(chord_squared) * (N::splat(1.0) - c_squared) / c_squared;
         (-(shape[1] * x.ln_1p())).exp()
     }
+
+    // Near the peak D is 1 − κ sin², κ = k (1 − c²) / c² for the exponent k, and as k grows D becomes exp(−κ sin²): data tell κ
+    // and k, while c and k share a long curved valley. κ lies above −β, β = 20 k / (20 + k): the lobe may grow towards grazing
+    // angles, but no faster than e²⁰. The coordinates are ln(κ + β) and ln k.
+    #[inline(always)]
+    fn shape<N: Number>(coordinates: [N; MAX_SHAPE]) -> [N; MAX_SHAPE] {
+        let mut shape = coordinates;
+        let exponent = coordinates[1].exp();
+        // 1 / c² = 1 + κ / k.
+        let raised = exponent / (exponent + N::splat(STEEPEST_GROWTH));
+        shape[0] = N::splat(1.0) / (coordinates[0].exp() / exponent + raised).sqrt();
+        shape[1] = exponent;
+        shape
+    }
+
+    fn coordinates(shape: &[f64; MAX_SHAPE]) -> [f64; MAX_SHAPE] {
+        let [c, exponent, rest] = *shape;
+        let raised = exponent / (exponent + STEEPEST_GROWTH);
+        [(exponent * (1.0 / (c * c) - raised)).ln(), exponent.ln(), rest]
+    }
+
+    #[inline(always)]
+    fn coordinate(index: usize) -> Coordinate {
+        if index == 0 {
+            // c² of the prior's median is 0.0225, its exponent 2; κ goes with 1 / c².
+            Coordinate { lower: -3.0, upper: 14.0, prior: (4.48, 2.4) }
+        } else {
+            plain_coordinate(&Self::SHAPE[index])
+        }
+    }
 }
+
+const STEEPEST_GROWTH: f64 = 20.0;
 
 /// [TorranceSparrow1967], [Blinn1977]: D = exp(−(δ/m)²) with δ = acos(n·h) the facet's angle.
 pub struct Gaussian;
@@ -113,7 +161,7 @@ impl Distribution for Gaussian {
     }];
     const TITLE: &'static str = "Gaussian facets";
     const CITATION: &'static str = "TorranceSparrow1967";
-    const STARTS: &'static [[f64; super::MAX_SHAPE]] = &[
+    const STARTS: &'static [[f64; MAX_SHAPE]] = &[
         [0.03, 0.0, 0.0],
         [0.06, 0.0, 0.0],
         [0.12, 0.0, 0.0],

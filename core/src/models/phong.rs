@@ -9,9 +9,10 @@ use crate::number::{Number, Real, array};
 pub struct Phong;
 
 impl Model for Phong {
+    type Seed = Self;
     const SHAPE: &'static [ShapeParameter] = &[ShapeParameter {
         name: "shininess",
-        lower: 0.2,
+        lower: 0.001,
         upper: 20_000.0,
         prior: (40.0, 2.4),
         meaning: "exponent of cos of the angle from the mirror direction",
@@ -19,6 +20,7 @@ impl Model for Phong {
     const LOBES: usize = 1;
     const RECIPROCAL: bool = false;
     const STARTS: &'static [[f64; MAX_SHAPE]] = &[
+        [0.05, 0.0, 0.0],
         [1.0, 0.0, 0.0],
         [4.0, 0.0, 0.0],
         [15.0, 0.0, 0.0],
@@ -53,7 +55,7 @@ impl Model for Phong {
 
     /// A lobe of exponent s takes in as much light as facets of c² = 1/(2 s) do: As = κ F(0) s / 2.
     #[inline(always)]
-    fn specular_scale<N: Number>(shape: &[N]) -> N {
-        shape[0].scale(N::Real::splat(0.08))
+    fn specular_scale<N: Number>(shape: &[N]) -> [N; 1] {
+        [shape[0].scale(N::Real::splat(0.08))]
     }
 }

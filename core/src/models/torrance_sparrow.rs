@@ -3,7 +3,7 @@
 //! F is not normalised: with c = α, As = κ / (4 c²) makes the lobe that of a smooth GGX interface times κ.
 
 use super::microfacet::{Distribution, Masking};
-use super::{Basis, FresnelAngle, MAX_SHAPE, Model, Optics, ShapeParameter};
+use super::{Basis, Coordinate, FresnelAngle, MAX_SHAPE, Model, Optics, ShapeParameter};
 use crate::fresnel::fresnel;
 use crate::geometry::{Illumination, chord_squared, facing};
 use crate::number::Number;
@@ -12,6 +12,7 @@ use std::marker::PhantomData;
 pub struct TorranceSparrow<D, G>(PhantomData<(D, G)>);
 
 impl<D: Distribution, G: Masking> Model for TorranceSparrow<D, G> {
+    type Seed = Self;
     const SHAPE: &'static [ShapeParameter] = D::SHAPE;
     const LOBES: usize = 1;
     const RECIPROCAL: bool = true;
@@ -41,7 +42,19 @@ impl<D: Distribution, G: Masking> Model for TorranceSparrow<D, G> {
 
     /// As = κ / (4 c²); facets of Gaussian width m take in what those of c = m do.
     #[inline(always)]
-    fn specular_scale<N: Number>(shape: &[N]) -> N {
-        N::splat(1.0) / (shape[0] * shape[0])
+    fn specular_scale<N: Number>(shape: &[N]) -> [N; 1] {
+        [N::splat(1.0) / (shape[0] * shape[0])]
+    }
+
+    #[inline(always)]
+    fn shape<N: Number>(coordinates: [N; MAX_SHAPE]) -> [N; MAX_SHAPE] {
+        D::shape(coordinates)
+    }
+    fn coordinates(shape: &[f64; MAX_SHAPE]) -> [f64; MAX_SHAPE] {
+        D::coordinates(shape)
+    }
+    #[inline(always)]
+    fn coordinate(index: usize) -> Coordinate {
+        D::coordinate(index)
     }
 }

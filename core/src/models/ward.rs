@@ -9,6 +9,7 @@ use crate::number::Number;
 pub struct Ward;
 
 impl Model for Ward {
+    type Seed = Self;
     const SHAPE: &'static [ShapeParameter] = &[ShapeParameter {
         name: "alpha",
         lower: 0.004,
@@ -49,7 +50,7 @@ impl Model for Ward {
     }
 
     #[inline(always)]
-    fn specular_scale<N: Number>(shape: &[N]) -> N {
-        N::splat(1.0) / (shape[0] * shape[0])
+    fn specular_scale<N: Number>(shape: &[N]) -> [N; 1] {
+        [N::splat(1.0) / (shape[0] * shape[0])]
     }
 }

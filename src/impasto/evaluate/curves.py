@@ -222,7 +222,7 @@ def half_width_deg(pixels: Pixels, shape: Array, normal: Array, camera: Camera) 
     Parameters
     ----------
     pixels : Pixels
-        Of the model.
+        Of the model; their median magnitudes weigh several lobes against each other.
     shape : ndarray of shape (S,)
     normal : ndarray of shape (3,)
     camera : Camera
@@ -234,6 +234,8 @@ def half_width_deg(pixels: Pixels, shape: Array, normal: Array, camera: Camera) 
     """
     if not pixels.model.lobes:
         return float("nan")
+    several = pixels.model.lobes > 1
+    weight = np.nanmedian(pixels.specular, axis=0) if several else np.ones(1)
     view = camera.view_direction
     mirror = 2 * (normal @ view) * normal - view
     aside = np.array([1.0, 0.0, 0.0]) - mirror[0] * mirror
@@ -252,7 +254,8 @@ def half_width_deg(pixels: Pixels, shape: Array, normal: Array, camera: Camera) 
             index=pixels.attributes["index_of_refraction"],
             fresnel=pixels.attributes["fresnel"],
         )
-        below = np.flatnonzero(lobes[:, 0] < 0.5 * lobes[0, 0])
+        highlight = lobes @ weight
+        below = np.flatnonzero(highlight < 0.5 * highlight[0])
         sides.append(_SWEEP_DEG[below[0]] if len(below) else _SWEEP_DEG[-1])
     return float(np.mean(sides))
 

@@ -33,7 +33,7 @@ _PREVIEW_PX = 1600
 _SAMPLED = 20_000
 """Pixels of a region whose normals the reading of the region integrates over."""
 
-_GRID = {0: 0, 1: 64, 2: 24, 3: 10}
+_GRID = {0: 0, 1: 96, 2: 32, 3: 12}
 """Values of each shape parameter in the table for single pixels, by the number of parameters."""
 
 
@@ -267,7 +267,11 @@ class PixelGloss:
     def __init__(self, model: ModelSpec, attributes: Mapping[str, Any], meter: Glossmeter) -> None:
         shape = model.shape
         count = _GRID[len(shape)]
-        self.axes = axes = [np.geomspace(parameter.lower, parameter.upper, count) for parameter in shape]
+        self.axes = axes = [
+            (np.geomspace if parameter.lower > 0 else np.linspace)(parameter.lower, parameter.upper, count)
+            for parameter in shape
+        ]
+        self._logarithmic = np.array([parameter.lower > 0 for parameter in shape], bool)
         light, view, weight = meter.rays(quadrature(13, 4))
         normal = np.broadcast_to([0.0, 0.0, 1.0], light.shape)
         table = []
@@ -285,18 +289,24 @@ class PixelGloss:
         self._constant = grid.reshape(-1) if not axes else None
         if axes:
             # Readings vary over decades with the width of the lobe.
-            self._table = RegularGridInterpolator([np.log(axis) for axis in axes], np.log(grid + 1e-30))
-            self._bounds = np.log([(axis[0], axis[-1]) for axis in axes]).T
+            places = self._places(np.array(axes).T).T
+            self._table = RegularGridInterpolator(list(places), np.log(grid + 1e-30))
+            self._bounds = places[:, [0, -1]].T
 
     def __call__(self, pixels: Pixels) -> Array:
         """Return gloss units, ndarray of shape (P,); NaN where the highlight is not known."""
         if self._constant is None:
-            inside = np.clip(np.log(pixels.shape), *self._bounds)
+            inside = np.clip(self._places(pixels.shape), *self._bounds)
             unit = np.exp(self._table(inside))
         else:
             unit = np.broadcast_to(self._constant, (len(pixels), len(self._constant)))
         result: Array = pixels.albedo * unit[:, 0] + np.sum(pixels.specular * unit[:, 1:], axis=1)
         return result
+
+    def _places(self, shape: Array) -> Array:
+        """Return shapes (P, S) as the table counts them: by their logarithm, where they are positive."""
+        positive = np.where(self._logarithmic, shape, 1.0)
+        return np.where(self._logarithmic, np.log(positive), shape)
 
 
 def _region(name: str, sample: Sample, tables: Sequence[PixelGloss]) -> RegionGloss:

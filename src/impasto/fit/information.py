@@ -15,7 +15,8 @@ from impasto.pixels import Pixels, luminance, pixel_positions_mm
 def parameter_names(pixels: Pixels) -> tuple[str, ...]:
     """Return what the last axis of `radiance_slopes` counts.
 
-    ``tilt_x`` and ``tilt_y`` turn the normal, in radians; all others are logarithms.
+    ``tilt_x`` and ``tilt_y`` turn the normal, in radians; all others are logarithms, but for the
+    shape parameters that may be negative.
     """
     channels = pixels.diffuse.shape[1]
     numbered = [""] if channels == 1 else [f"_{channel}" for channel in range(channels)]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from impasto import store as stores
 from impasto.fit.procedure import FitOptions
@@ -50,7 +50,7 @@ def fit_tile(
     position_mm: NDArray[np.float32] | None = None,
     options: FitOptions | None = None,
     paper: Sample | None = None,
-    normal: tuple[float, float, float] | None = None,
+    normal: ArrayLike | None = None,
 ) -> stores.Maps:
     """Fit a model to pixels: by the joint procedure, or by the paper's for a sample.
 
@@ -74,9 +74,9 @@ def fit_tile(
     options : FitOptions, optional
     paper : Sample, optional
         What holds for the whole sample, for the paper's procedure; its arm sweeps the XZ plane.
-    normal : tuple of float, optional
-        Unit normal of all pixels, for a sample known to be flat: it is held by the joint procedure, which
-        then assumes nothing of the material either.
+    normal : array_like of shape (3,) or (N, 3), optional
+        Unit normal of all pixels or of each, for a surface that is known: it is held by the joint procedure,
+        which then assumes nothing of the material either.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def fit_tile(
     from impasto import _core
 
     options = options or FitOptions()
-    count, _, channels = radiance.shape
+    count, pixels, channels = radiance.shape
     result = _core.fit(
         model.name,
         np.ascontiguousarray(radiance),
@@ -110,15 +110,19 @@ def fit_tile(
         loss_scale=options.loss_scale,
         max_steps=options.max_steps,
         paper=None if paper is None else (paper.threshold, paper.specular, paper.refined, paper.peak),
-        normal=normal,
+        normal=None if normal is None else _per_pixel(normal, pixels),
     )
     for ending in ("", "_sd"):
-        if f"specular{ending}" not in result:
+        if f"normal{ending}" not in result:
             continue
-        if model.shape_names:
+        if model.shape_names and f"shape{ending}" in result:
             shape = result.pop(f"shape{ending}")
             for column, name in enumerate(model.shape_names):
                 result[f"{name}{ending}"] = shape[:, column]
-        if model.lobes == 1:
+        if model.lobes == 1 and f"specular{ending}" in result:
             result[f"specular{ending}"] = result[f"specular{ending}"][:, 0]
     return dict(result)
+
+
+def _per_pixel(normal: ArrayLike, pixels: int) -> NDArray[np.float32]:
+    return np.ascontiguousarray(np.broadcast_to(np.asarray(normal, np.float32), (pixels, 3)))

@@ -18,10 +18,15 @@ _TITLES = {
     "specular": "Specular magnitude",
     "ambient": "Ambient term",
     "c": "Width of the highlight, c",
+    "c2": "Width of the broader lobe, c2",
     "m": "Width of the highlight, m",
     "shininess": "Shininess",
     "alpha": "Slope of the facets, alpha",
+    "alpha_x": "Slope of the facets along x",
+    "alpha_y": "Slope of the facets along y",
+    "correlation": "Correlation of the slopes along x and y",
     "exponent": "Exponent of the facets' distribution",
+    "sigma": "Roughness of the diffuse surface, sigma",
     "chi2_reduced": "Reduced chi-square",
     "residual_rms": "Residual",
     "view_tilt": "Tilt of the view that suits the highlight",
@@ -30,15 +35,24 @@ _TITLES = {
 _LABELS = {
     "specular": "specular magnitude As",
     "c": "c (small is glossy)",
+    "c2": "c2 (small is glossy)",
     "m": "m (small is glossy)",
     "shininess": "shininess (large is glossy)",
     "alpha": "alpha (small is glossy)",
+    "alpha_x": "alpha_x (small is glossy)",
+    "alpha_y": "alpha_y (small is glossy)",
+    "correlation": "correlation (0: strokes along x or y, or none)",
     "exponent": "exponent (small has long tails)",
+    "sigma": "sigma, radians (0 is Lambert)",
     "chi2_reduced": "reduced chi-square",
     "residual_rms": "RMS residual, relative radiance",
     "view_tilt": "θv in the arm's plane, radians",
 }
-_LOGARITHMIC = {"specular", "shininess", "c", "m", "alpha", "exponent", "chi2_reduced", "residual_rms"}
+_LOGARITHMIC = {
+    *("specular", "shininess", "c", "c2", "m", "alpha", "alpha_x", "alpha_y", "exponent"),
+    *("chi2_reduced", "residual_rms"),
+}
+_SIGNED = {"view_tilt", "correlation"}
 COLOURS = {"diffuse", "ambient"}
 
 
@@ -73,7 +87,7 @@ def map_limits(name: str, values: NDArray[np.floating]) -> tuple[float, float]:
     if name in ("c", "diffuse") and not (values > 1).any():
         return 0.0, 1.0
     finite = values[np.isfinite(values)]
-    if name == "view_tilt":
+    if name in _SIGNED:
         side = float(np.abs(finite).max()) if finite.size else 1.0
         return -side, side
     high = float(np.percentile(finite, 99.9)) if finite.size else 1.0
@@ -104,8 +118,11 @@ def draw_map(path: Path, name: str, values: NDArray[Any], *, model: str) -> None
     elif name in COLOURS:
         pictures.draw_colour(path, values, title=heading, exposure=1 / map_limits(name, values)[1])
     else:
-        if values.ndim == 3:
-            values = np.sqrt(np.mean(np.square(values), axis=2)) if uncertainty else values[..., 0]
+        if values.ndim == 3 and name.removesuffix("_sd") in COLOURS:
+            values = np.sqrt(np.mean(np.square(values), axis=2))
+        elif values.ndim == 3:
+            values = np.concatenate(np.moveaxis(values, 2, 0), axis=1)
+            heading += ", the narrow lobe on the left"
         pictures.draw_values(
             path,
             np.degrees(values) if name == "normal_sd" else values,

@@ -95,7 +95,7 @@ export function modelFragment(model: Model, columns: readonly Column[], channels
       ? `vec3(${[0, 1, 2].map((i) => `value(code(at, ${at(name) + i}), ${at(name) + i})`).join(", ")})`
       : `vec3(value(code(at, ${at(name)}), ${at(name)}))`;
   const shape = model.shape
-    .map((name, i) => `  p.shape[${i}] = matte ? 1.0 : value(code(at, ${at(name)}), ${at(name)});`)
+    .map((name, i) => `  p.shape[${i}] = matte ? 0.5 : value(code(at, ${at(name)}), ${at(name)});`)
     .join("\n");
   const lobes = Array.from({ length: model.lobes }, (_, i) => i);
   const unseen = [...lobes.map((i) => at("specular") + i), ...model.shape.map(at)];
@@ -134,7 +134,7 @@ Pixel pixel(ivec2 at) {
   p.diffuse = ${colour("diffuse")};
   bool matte = ${unseen.length ? unseen.map((i) => `code(at, ${i}) == 0u`).join(" || ") : "false"};
   for (int i = 0; i < MAX_LOBES; i++) p.specular[i] = 0.0;
-  for (int i = 0; i < MAX_SHAPE; i++) p.shape[i] = 1.0;
+  for (int i = 0; i < MAX_SHAPE; i++) p.shape[i] = 0.5;
 ${lobes.map((i) => `  p.specular[${i}] = matte ? 0.0 : value(code(at, ${at("specular") + i}), ${at("specular") + i});`).join("\n")}
 ${shape}
   p.ambient = ${at("ambient") < 0 ? "vec3(0.0)" : colour("ambient")};

@@ -3,20 +3,26 @@
 import { lambert } from "./lambert";
 import { gaussian, generalisedTrowbridgeReitz, smith, trowbridgeReitz, vGroove } from "./microfacet";
 import type { Model } from "./model";
+import { orenNayar } from "./oren-nayar";
 import { phong } from "./phong";
 import { torranceSparrow } from "./torrance-sparrow";
+import { twoLobes } from "./two-lobes";
 import { ward } from "./ward";
+import { wardAnisotropic } from "./ward-anisotropic";
 
 export type { Model } from "./model";
 
 export const MODELS: readonly Model[] = [
   lambert,
+  orenNayar,
   phong,
   torranceSparrow("torrance-sparrow", trowbridgeReitz, vGroove),
   torranceSparrow("torrance-sparrow-gaussian", gaussian, vGroove),
   torranceSparrow("torrance-sparrow-smith", trowbridgeReitz, smith),
+  twoLobes,
   torranceSparrow("gtr", generalisedTrowbridgeReitz, vGroove),
   ward,
+  wardAnisotropic,
 ];
 
 /** The largest number of shape parameters and of lobes of any model. */
