@@ -296,7 +296,7 @@ class PixelGloss:
     def __call__(self, pixels: Pixels) -> Array:
         """Return gloss units, ndarray of shape (P,); NaN where the highlight is not known."""
         if self._constant is None:
-            inside = np.clip(self._places(pixels.shape), *self._bounds)
+            inside = np.clip(self._places(pixels.shape.astype(np.float64)), *self._bounds)
             unit = np.exp(self._table(inside))
         else:
             unit = np.broadcast_to(self._constant, (len(pixels), len(self._constant)))
