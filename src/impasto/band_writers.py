@@ -141,7 +141,7 @@ def write_tiff_bands(
     bands : iterable of ndarray of shape (rows, W, C)
         The rows, top to bottom, of `dtype`.
     shape : (H, W, C)
-        Size of the whole picture; C is 1 or 3.
+        Size of the whole picture; C is 1, 2 or 3.
     dtype : dtype
         uint8 or uint16.
     description : str, optional
@@ -165,6 +165,9 @@ def write_tiff_bands(
             shape=(height, width, channels) if channels > 1 else (height, width),
             dtype=np.dtype(dtype),
             photometric="rgb" if channels == 3 else "minisblack",
+            # Two lobes are two samples of a pixel, not two pictures.
+            planarconfig="contig" if channels > 1 else None,
+            extrasamples=("unspecified",) * (channels - 1) if channels == 2 else None,
             compression="zlib",
             predictor=True,
             rowsperstrip=_TIFF_STRIP_ROWS,
