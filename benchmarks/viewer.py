@@ -28,7 +28,8 @@ VIEWER = "document.querySelector('impasto-viewer')"
 def measure(folder: Path, panning_s: float = PANNING_S) -> dict[str, float]:
     """Return seconds and requests until the first picture, and the browser's largest memory while panning.
 
-    Memory is the proportional set size of all processes of the browser, its graphics process included.
+    Memory is the proportional set size of all processes of the browser, its graphics process included, above
+    what they take before the page is opened.
     """
     from playwright.sync_api import sync_playwright
 
