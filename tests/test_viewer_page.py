@@ -194,7 +194,7 @@ def test_models_and_photographs_are_compared(open_page):
     handle.press("ArrowLeft")
     assert state(page)["swipe"] == pytest.approx(dragged - 0.02)
     page.get_by_label("Arrangement").select_option("side")
-    assert page.locator(".divider button").count() == 0
+    assert page.locator(".divider button").is_hidden()
     page.get_by_label("Compare", exact=True).select_option("photograph:nearest")
     complete(page)
     assert "its light is" in page.locator(".caption.right").text_content()
