@@ -308,6 +308,7 @@ impl<const ISA: Isa, const C: usize, const L: usize> Deviations<ISA, C, L> {
 }
 
 #[inline(always)]
+#[allow(clippy::too_many_arguments)]
 fn write_row<const ISA: Isa, const C: usize, const L: usize>(
     mut row: Row,
     [channels, lobes, shapes, ambient]: [usize; 4],
