@@ -123,6 +123,8 @@ def parameter_columns(fit: Fit, maps: Sequence[str]) -> list[Parameter]:
             ]
         elif name == "view_tilt":
             columns.append(linear(name, 0, -math.pi, math.pi, units, long_name))
+        elif name == "correlation":  # the only shape parameter that may be negative
+            columns.append(linear(name, 0, -1.0, 1.0, units, long_name))
         elif name == "status":
             columns.append(Parameter(name, 0, "linear", 1.0, -1.0, units, long_name))
         else:

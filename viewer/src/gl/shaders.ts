@@ -174,7 +174,7 @@ vec3 radiance(Pixel p, ivec2 at, float diffusePart, float specularPart) {
     }
     Basis b = basis(p.normal, p.shape, illumination(direction, view, optics.index), optics);
     float lobes = 0.0;
-    for (int j = 0; j < ${model.lobes}; j++) lobes += p.specular[j] * b.specular[j];
+    for (int j = 0; j < ${model.lobes}; j++) if (p.specular[j] > 0.0) lobes += p.specular[j] * b.specular[j];
     vec3 reflected = diffusePart * (p.diffuse * b.diffuse + p.ambient) + specularPart * lobes * specularColour;
     sum += reflected * falloff * lightColour[i];
   }
