@@ -55,7 +55,8 @@ def _random_maps(spec, maps, unit):
         high = 2.0 if spec.name.startswith(("phong", "ward")) else 40.0
         values["specular"] = between(1e-3, high, *values["specular"].shape[2:])
     for parameter in spec.shape:
-        values[parameter.name] = between(parameter.lower, parameter.upper)
+        draw = between if parameter.lower > 0 else lambda low, high: rng.uniform(low, high, size)
+        values[parameter.name] = draw(parameter.lower, parameter.upper)
     if spec.ambient:
         values["ambient"] = between(1e-3, 0.1, values["ambient"].shape[2])
     values["status"][:] = 0
