@@ -229,7 +229,8 @@ pub fn outlined<const ISA: Isa, T>(function: impl FnOnce() -> T) -> T {
             _ => {}
         }
     }
-    #[inline]
+    // Nothing else keeps the compiler from inlining it: the instructions are those of the caller.
+    #[inline(never)]
     fn plain<T>(function: impl FnOnce() -> T) -> T {
         function()
     }
