@@ -10,6 +10,8 @@ from impasto.models import MODELS
 from impasto.pixels import pixels_of_maps, render_pixels
 
 NOISE = (1e-4, 0.0, 0.005)
+# What shape parameters are drawn from that are not widths like c.
+RANGES = {"shininess": (0.2, 20_000.0), "exponent": (0.1, 300.0), "m": (0.004, 2.0)}
 
 
 def dome(count=40):
@@ -27,8 +29,11 @@ def some_pixels(model, count, seed=0, c=(0.1, 0.4), specular=(0.5, 8.0)):
         "specular": rng.uniform(*specular, (count, spec.lobes)),
         "ambient": rng.uniform(0.01, 0.05, (count, 3)),
     }
-    for number, parameter in enumerate(spec.shape):
-        low, high = c if number == 0 and parameter.upper < 2 else (parameter.lower, parameter.upper)
+    for parameter in spec.shape:
+        if parameter.lower < 0:
+            maps[parameter.name] = rng.uniform(parameter.lower, parameter.upper, count)
+            continue
+        low, high = RANGES.get(parameter.name, c)
         maps[parameter.name] = np.exp(rng.uniform(np.log(low), np.log(high), count))
     attributes = {
         "model": model,
@@ -59,7 +64,10 @@ def moved(pixels, parameter, step):
             values[:, parameter - names.index(next(n for n in names if n.startswith(kind)))] *= np.exp(step)
             return replace(pixels, **{kind: values})
     shape = pixels.shape.astype(np.float64).copy()
-    shape[:, parameter - 2] *= np.exp(step)
+    if pixels.model.shape[parameter - 2].lower < 0:
+        shape[:, parameter - 2] += step
+    else:
+        shape[:, parameter - 2] *= np.exp(step)
     return replace(pixels, shape=shape)
 
 

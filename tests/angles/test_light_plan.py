@@ -71,7 +71,7 @@ def test_planned_lights_do_better_than_even_ones(kind, tmp_path):
 
 def test_a_plan_from_which_fits_go_astray_says_so(tmp_path):
     """Expected errors are linear; what fits to simulated photographs find is not."""
-    found = plan("arm", 5, out=tmp_path)
+    found = plan("arm", 6, out=tmp_path)
     assert found.simulated_rms > 2 * found.expected_rms
     assert any("go astray" in line for line in plan_lines(found))
     assert not any("go astray" in line for line in plan_lines(plan("arm", 15, out=tmp_path)))
