@@ -8,7 +8,7 @@ NODE   := viewer/node_modules/.installed
 WEB    := src/impasto/web/.built
 PAGES  := $(wildcard viewer/*.*) $(shell find viewer/src viewer/public -type f 2>/dev/null)
 
-.PHONY: demo test test-rust test-viewer test-python check bench lock clean browser postgresql
+.PHONY: demo test test-rust test-viewer test-python check bench lock clean browser nginx postgresql
 
 demo: $(VENV)/.built $(WEB)
 	$(BIN)/impasto demo
@@ -21,7 +21,7 @@ test-rust:
 test-viewer: $(NODE)
 	npm --prefix viewer test
 
-test-python: $(VENV)/.built $(WEB) browser postgresql
+test-python: $(VENV)/.built $(WEB) browser nginx postgresql
 	$(BIN)/pytest
 
 check: $(VENV)/.built $(NODE)
@@ -55,17 +55,19 @@ $(WEB): $(NODE) $(PAGES)
 	npm --prefix viewer run build
 	touch $@
 
-# The tests of the pages run in Debian's browser.
-browser:
-	@command -v chromium >/dev/null || { \
-	  apt=$$(command -v apt-get) && [ "$$(id -u)" = 0 ] || apt="sudo $$apt"; \
-	  $$apt update --quiet && $$apt install --yes --quiet --no-install-recommends chromium; }
+# What the tests need of Debian: a browser for the pages, a web server for published folders, and PostgreSQL, of
+# which the tests of the experiment start a server of their own.
+debian = apt=$$(command -v apt-get) && [ "$$(id -u)" = 0 ] || apt="sudo $$apt"; \
+  $$apt update --quiet && $$apt install --yes --quiet --no-install-recommends
 
-# The tests of the experiment start a PostgreSQL server of their own.
+browser:
+	@command -v chromium >/dev/null || { $(debian) chromium; }
+
+nginx:
+	@command -v nginx >/dev/null || { $(debian) nginx-light; }
+
 postgresql:
-	@ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || command -v initdb >/dev/null || { \
-	  apt=$$(command -v apt-get) && [ "$$(id -u)" = 0 ] || apt="sudo $$apt"; \
-	  $$apt update --quiet && $$apt install --yes --quiet --no-install-recommends postgresql; }
+	@ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || command -v initdb >/dev/null || { $(debian) postgresql; }
 
 # Lock files hold versions and hashes, never download addresses. Needs uv.
 lock:
