@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -12,7 +11,7 @@ import numpy as np
 
 from impasto.errors import Problem, raise_problems
 from impasto.psychophysics.scaling.groups import ScaledGroup
-from impasto.psychophysics.scaling.trials import Trial, TrialsError
+from impasto.psychophysics.scaling.trials import Trial, TrialsError, read_table
 
 _KEYS = ("sample", "angle", "condition")
 Errors = Mapping[str, Mapping[tuple[str, str, str], float]]
@@ -66,17 +65,7 @@ def read_errors(path: str | PathLike[str]) -> Errors:
         With all problems of the file.
     """
     file = Path(path)
-    try:
-        with file.open(encoding="utf-8-sig", newline="") as stream:
-            reader = csv.DictReader(stream)
-            header = [name.strip() for name in reader.fieldnames or ()]
-            reader.fieldnames = header
-            rows = list(reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or "is no text in UTF-8 with commas"
-        raise TrialsError(
-            Problem(str(file), f"cannot be read: {reason}", "Give a CSV file of differences")
-        ) from error
+    header, rows = read_table(file, "Give a CSV file of differences")
     kinds = [name for name in header if name not in _KEYS]
     if not set(_KEYS) <= set(header) or not kinds:
         raise TrialsError(

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from impasto.errors import ImpastoError, Problem, raise_problems
 from impasto.output import write_text
@@ -62,6 +63,37 @@ class Trial:
     simulated: bool = False
 
 
+def read_table(file: Path, do: str) -> tuple[list[str], list[dict[str | Any, str | Any]]]:
+    """Read a CSV file whose first row names the columns.
+
+    Parameters
+    ----------
+    file : Path
+    do : str
+        What the error says to do.
+
+    Returns
+    -------
+    header : list of str
+    rows : list of dict of str to str
+        Cells beyond the header's under the key None.
+
+    Raises
+    ------
+    TrialsError
+        If it cannot be read.
+    """
+    try:
+        with file.open(encoding="utf-8-sig", newline="") as stream:
+            reader = csv.DictReader(stream)
+            header = [name.strip() for name in reader.fieldnames or ()]
+            reader.fieldnames = header
+            return header, list(reader)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = getattr(error, "strerror", None) or "is no text in UTF-8 with commas"
+        raise TrialsError(Problem(str(file), f"cannot be read: {reason}", do)) from error
+
+
 def read_trials(path: str | PathLike[str]) -> tuple[Trial, ...]:
     """Read a CSV file with one row per trial.
 
@@ -81,17 +113,7 @@ def read_trials(path: str | PathLike[str]) -> tuple[Trial, ...]:
         With all problems of the file, if it cannot be read or a row cannot be understood.
     """
     file = Path(path)
-    try:
-        with file.open(encoding="utf-8-sig", newline="") as stream:
-            reader = csv.DictReader(stream)
-            header = [name.strip() for name in reader.fieldnames or ()]
-            reader.fieldnames = header
-            rows = list(reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or "is no text in UTF-8 with commas"
-        raise TrialsError(
-            Problem(str(file), f"cannot be read: {reason}", "Give the CSV file of an experiment")
-        ) from error
+    header, rows = read_table(file, "Give the CSV file of an experiment")
     missing = [name for name in COLUMNS if name not in header]
     if missing:
         raise TrialsError(
