@@ -1,5 +1,6 @@
 """Fixtures that every test may use."""
 
+import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,6 +22,11 @@ def shared() -> Path:
     if not folder.is_dir():
         pytest.skip("the reference figures and photographs (../shared) are not on this machine")
     return folder
+
+
+def _absent(reason: str) -> None:
+    # Where a machine tests every change, nothing may be left out unseen.
+    (pytest.fail if os.environ.get("CI") else pytest.skip)(reason)
 
 
 @pytest.fixture(scope="session")
@@ -49,7 +55,7 @@ def web() -> Path:
     """Return the folder of the built pages, or skip."""
     folder = Path(__file__).resolve().parents[1] / "src" / "impasto" / "web"
     if not (folder / "index.html").is_file():
-        pytest.skip("the pages are not built: make src/impasto/web/.built")
+        _absent("the pages are not built: make src/impasto/web/.built")
     return folder
 
 
@@ -58,7 +64,7 @@ def browser() -> "Iterator[Browser]":
     """Return a browser that draws WebGL2 in software, or skip; make contexts and pages of it as needed."""
     executable = shutil.which("chromium")
     if executable is None:
-        pytest.skip("chromium is not installed: make browser")
+        _absent("chromium is not installed: make browser")
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
