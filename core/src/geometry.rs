@@ -114,8 +114,9 @@ impl Place {
 }
 
 /// The unit vector across the plane in which all lights lie, seen from the centre of the painting; `None` where they do not
-/// lie in one, or on a line.
-pub fn across(lights: &[Place]) -> Option<[f64; 3]> {
+/// lie in one, or on a line, or where a distant camera lies in it too: then no sample changes to first order with a tilt out
+/// of the plane, a narrow lobe tilted out of it is a broad one in it, and normals may as well stay there.
+pub fn across(lights: &[Place], camera: &Place) -> Option<[f64; 3]> {
     /// The sine of 1°: an arm that is set up by hand sweeps a plane no better.
     const FLAT: f64 = 0.0175;
     let directions: Vec<[f64; 3]> = lights.iter().map(|place| place.seen_from(0.0, 0.0).0).collect();
@@ -125,7 +126,9 @@ pub fn across(lights: &[Place]) -> Option<[f64; 3]> {
         return None;
     }
     let across = normalise(widest);
-    directions.iter().all(|direction| dot(*direction, across).abs() < FLAT).then_some(across)
+    let in_plane = |direction: [f64; 3]| dot(direction, across).abs() < FLAT;
+    let told = camera.near() || !in_plane(camera.seen_from(0.0, 0.0).0);
+    (told && directions.into_iter().all(in_plane)).then_some(across)
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
@@ -160,12 +163,15 @@ mod tests {
     }
 
     #[test]
-    fn lights_on_an_arm_lie_in_a_plane_and_those_of_a_dome_do_not() {
+    fn tilts_out_of_a_plane_are_tried_for_the_lights_of_an_arm_seen_from_aside() {
         let arm = [-0.6f64, 0.1, 0.9].map(|angle| Place::Direction([angle.sin(), 0.0, angle.cos()]));
-        assert_eq!(across(&arm).map(|axis| axis[1].abs()), Some(1.0));
+        let camera = Place::Direction([0.0, 0.1, 0.995]);
+        assert_eq!(across(&arm, &camera).map(|axis| axis[1].abs()), Some(1.0));
         let raised = Place::Position([0.0, 300.0, 1000.0]);
-        assert_eq!(across(&[&arm[..], &[raised]].concat()), None);
-        assert_eq!(across(&arm[..1]), None);
+        assert_eq!(across(&[&arm[..], &[raised]].concat(), &camera), None);
+        assert_eq!(across(&arm[..1], &camera), None);
+        assert_eq!(across(&arm, &Place::Direction([0.2, 0.0, 0.98])), None);
+        assert!(across(&arm, &Place::Position([0.0, 0.0, 900.0])).is_some());
     }
 
     #[test]

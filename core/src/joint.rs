@@ -37,7 +37,7 @@ pub struct JointFit<'a, M, const ISA: Isa, const C: usize, const P: usize, const
     /// Share of each light's weight that its samples keep at the start of a robust fit.
     kept: Vec<Lane<ISA>>,
     scratch: Scratch<ISA, C, P, L>,
-    /// Across the plane of the lights, where they lie in one.
+    /// Across the plane of the lights, where they lie in one and the view does not.
     across: Option<[f64; 3]>,
     model: PhantomData<M>,
 }
@@ -62,7 +62,7 @@ impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: u
             grey: Vec::with_capacity(stack.lights.len()),
             kept: Vec::with_capacity(stack.lights.len()),
             scratch: Scratch::new(stack.lights.len()),
-            across: across(&stack.lights),
+            across: across(&stack.lights, &stack.camera),
             model: PhantomData,
         }
     }

@@ -34,11 +34,6 @@ def summary(arm_store, interleaved, tmp_path_factory):
     )
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="since fits of lights in a plane begin on both sides of it, some take narrow lobes between 24 "
-    "angles, and the RMS there is 12 % above that of all 37",
-)
 def test_fewer_chosen_photographs_serve_than_evenly_spaced_ones(summary):
     """Judged by interleaved angles, within 5 % of the RMS of all 37."""
     whole = summary.models[0].regions[0]
