@@ -150,6 +150,19 @@ def test_an_advantage_of_the_left_is_found(tmp_path):
     assert group.position > 3 * group.position_error
 
 
+def test_an_advantage_of_the_left_is_finite_or_not_told(tmp_path):
+    header = "observer,sample,angle,condition_A,condition_B,choice,side"
+    # Whoever sees x on the left chooses it; the likelihood's advantage has no maximum.
+    sides = ["left"] * 5 + ["right"] * 4
+    rows = [f"p{n},a,0,x,y,{'AB'[n > 6]},{side}" for n, side in enumerate(sides)]
+    group = impasto.scale(people(tmp_path, rows, header)).groups[0]
+    assert 0 < group.position < 2
+    assert group.position_error < 1
+    # Where x stood always on the left, its advantage is not to be told from that of the left.
+    rows = [f"p{n},a,0,x,y,{'AB'[n > 6]},left" for n in range(9)]
+    assert np.isnan(impasto.scale(people(tmp_path, rows, header)).groups[0].position)
+
+
 def everyone(choices, observers=6):
     """Return a row for each observer and each pair with the chosen first."""
     return [f"p{number},a,0,{first},{second},A" for number in range(observers) for first, second in choices]

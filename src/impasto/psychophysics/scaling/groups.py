@@ -125,7 +125,8 @@ class ScaledGroup:
     threshold : float
         Glenn and David's, in the unit; NaN without ties.
     position, position_error : float
-        Advantage of the left in the unit, and its standard error; NaN if the sides are not known.
+        Advantage of the left in the unit, with its bias removed, and its standard error; NaN if the sides are
+        not known, or each condition stood always on the same one.
     agreement : Agreement or None
         Kendall's u where every pair was answered equally often, without ties.
     notes : tuple of str
@@ -239,8 +240,11 @@ def scale_comparisons(name: str, by: str, comparisons: Comparisons, options: Sca
     notes += found.notes
     if options.model == "closed-form" and found.method in ("observers", "percentile", "likelihood"):
         notes.append("the values are those of the closed form, the limits those of the likelihood's scale")
+    # With its bias removed it is finite also where everybody who saw a condition on the left chose it.
     sided = (
-        fit_likelihood(comparisons, link=options.link, position=True) if comparisons.wins_left.any() else None
+        fit_likelihood(comparisons, link=options.link, position=True, reduce_bias=True)
+        if comparisons.wins_left.any()
+        else None
     )
     factor = options.factor
     return ScaledGroup(

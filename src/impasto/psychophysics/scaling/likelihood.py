@@ -160,6 +160,8 @@ def fit_likelihood(
     design, chosen, refused = design[compared], chosen[compared], refused[compared]
     status, parts = existence(wins, finite=reduce_bias or precision > 0)
     degrees = len(chosen) - (conditions - 1) - int(position)
+    if position and np.linalg.matrix_rank(design) < conditions:
+        status = "disconnected"  # the sides cannot be told from the conditions
     if status != "converged":
         nothing = np.full(conditions, np.nan)
         unknown = np.full((conditions, conditions), np.nan)
