@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#22201c")
 _MARKERS = "osD^vP*"
 _INK = "#22201c"
+# In inches; the line that says who is simulated needs as much.
+_NARROWEST = 5.4
 # Distance of two conditions of a group, and the share of the group's width that all of them may take.
 _STEP, _SPREAD = 0.14, 0.6
 
@@ -95,7 +97,7 @@ def _look(summary_conditions: Sequence[str], condition: str) -> dict[str, Any]:
 def _scales(single: Sequence[ScaledGroup], pooled: Sequence[ScaledGroup], summary: ScaleSummary) -> Figure:
     groups = [*single, *pooled]
     conditions = pooled[0].conditions
-    figure = _figure(max(5.0, 1.5 + 0.35 * len(groups) * max(2, len(conditions))), 4.8)
+    figure = _figure(max(_NARROWEST, 1.5 + 0.35 * len(groups) * max(2, len(conditions))), 4.8)
     axes = figure.subplots()
     axes.axhline(0, color="#bbbbbb", linewidth=0.8)
     step = min(_STEP, _SPREAD / len(conditions))
@@ -163,7 +165,7 @@ def _proportions(group: ScaledGroup) -> Figure:
     size = len(group.conditions)
     trials = group.counts + group.counts.T
     shown = np.divide(group.counts, trials, out=np.full_like(trials, np.nan), where=trials > 0)
-    figure = _figure(2.6 + 0.95 * size, 1.9 + 0.8 * size)
+    figure = _figure(max(_NARROWEST, 2.6 + 0.95 * size), 1.9 + 0.8 * size)
     axes = figure.subplots()
     image = axes.imshow(shown, vmin=-0.2, vmax=1.2, cmap="PuOr", aspect="auto")
     for (row, column), share in np.ndenumerate(shown):
@@ -186,7 +188,7 @@ def _proportions(group: ScaledGroup) -> Figure:
 
 def _physical(errors: Sequence[PhysicalError], summary: ScaleSummary) -> Figure:
     conditions = summary.groups[0].conditions
-    figure = _figure(4.2 * len(errors) + 0.6, 4.6)
+    figure = _figure(max(_NARROWEST, 4.2 * len(errors) + 0.6), 4.6)
     for axes, error in zip(figure.subplots(1, len(errors), squeeze=False)[0], errors, strict=True):
         # The scale knows only differences within a group, and so must the errors beside it.
         for _, condition, measured, value, low, high in _centred(error):
