@@ -42,14 +42,15 @@ def measure_differences(
     }
     found: dict[str, dict[tuple[str, str, str], float]] = {kind: {} for kind in KINDS}
     for key, file in files.items():
-        reference = _read(files[key[0], key[1], PHOTOGRAPH])
-        picture = _read(file)
+        reference = read_picture(files[key[0], key[1], PHOTOGRAPH])
+        picture = read_picture(file)
         for kind in KINDS:
             found[kind][key] = image_difference(reference, picture, kind)
     return found
 
 
-def _read(file: Path) -> NDArray[np.uint8]:
+def read_picture(file: Path) -> NDArray[np.uint8]:
+    """Return a picture of an experiment: ndarray of shape (H, W, 3), uint8, as the display is sent it."""
     from PIL import Image
 
     with Image.open(file) as image:

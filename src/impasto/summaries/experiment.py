@@ -10,6 +10,7 @@ from impasto.summaries.words import count, seconds
 if TYPE_CHECKING:
     from impasto.psychophysics.experiment.administer import ExportSummary
     from impasto.psychophysics.experiment.create import CreateSummary
+    from impasto.psychophysics.experiment.simulate import SimulateSummary
 
 
 def create_lines(summary: CreateSummary) -> Iterator[str]:
@@ -33,7 +34,14 @@ def create_lines(summary: CreateSummary) -> Iterator[str]:
         yield f"note: {note}"
 
 
+def simulate_lines(summary: SimulateSummary) -> Iterator[str]:
+    """Yield who answered, and by what."""
+    names = f"{summary.observers[0]} to {summary.observers[-1]}"
+    yield f"SIMULATED: {names}, a program that goes by {summary.by}, gave {count(summary.answers, 'answer')}"
+
+
 def export_lines(summary: ExportSummary) -> Iterator[str]:
     """Yield what was written."""
     answers, observers = count(summary.answers, "answer"), count(summary.observers, "observer")
-    yield f"{answers} of {observers} in {summary.file}"
+    simulated = f", {summary.simulated} of them SIMULATED," if summary.simulated else ""
+    yield f"{answers} of {observers}{simulated} in {summary.file}"

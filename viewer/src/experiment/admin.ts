@@ -31,6 +31,7 @@ interface Scaled {
 interface LiveScale {
   answers: number;
   observers: number;
+  simulated: number;
   unit: string;
   status: string;
   conditions: Scaled[];
@@ -108,10 +109,11 @@ function sessionTable(states: SessionState[], forget: (observer: string) => void
 
 function scaleTable(scale: LiveScale): HTMLElement {
   const shown = (value: number | null) => (value === null ? "–" : value.toFixed(2));
+  const simulated = scale.simulated > 0 ? `, ${scale.simulated} of them SIMULATED` : "";
   return make(
     "div",
     {},
-    make("p", {}, `${scale.answers} answers of ${scale.observers} observers; ${scale.status}`),
+    make("p", {}, `${scale.answers} answers of ${scale.observers} observers${simulated}; ${scale.status}`),
     table(
       ["Condition", "Chosen", `Scale, ${scale.unit}`, "Standard error"],
       scale.conditions.map((entry) => [

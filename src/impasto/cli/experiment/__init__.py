@@ -6,5 +6,5 @@ from impasto.cli.app import group
 
 commands = group("experiment", "Compare renderings with photographs, by the eyes of observers.")
 
-for _name in ("create", "serve", "invite", "export", "forget"):
+for _name in ("create", "simulate", "serve", "invite", "export", "forget"):
     import_module(f"{__name__}.{_name}")

@@ -11,8 +11,9 @@ if TYPE_CHECKING:
     from impasto.psychophysics.experiment.create import create
     from impasto.psychophysics.experiment.manifest import Presentation, Viewing
     from impasto.psychophysics.experiment.serve import serve
+    from impasto.psychophysics.experiment.simulate import simulate
 
-__all__ = ["Presentation", "Viewing", "create", "export", "forget", "invite", "serve"]
+__all__ = ["Presentation", "Viewing", "create", "export", "forget", "invite", "serve", "simulate"]
 
 # Where each name is found when it is asked for: the server is not imported to make an experiment.
 _HOME = {
@@ -23,6 +24,7 @@ _HOME = {
     "forget": "administer",
     "invite": "administer",
     "serve": "serve",
+    "simulate": "simulate",
 }
 
 make_lazy(__name__, _HOME)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -19,6 +21,7 @@ from impasto.psychophysics.experiment.manifest import (
     read_experiment,
 )
 from impasto.psychophysics.experiment.sessions import Invitation, forget_observer, invite_observers
+from impasto.psychophysics.scaling.trials import is_simulated
 
 _MOST_OBSERVERS = 1000
 
@@ -34,11 +37,14 @@ class ExportSummary:
         Of all kinds of trials.
     observers : int
         Who gave them.
+    simulated : int
+        How many of these are no persons.
     """
 
     file: Path
     answers: int
     observers: int
+    simulated: int
 
 
 def invite(
@@ -85,8 +91,7 @@ def invite(
         if not 1 <= number <= _MOST_OBSERVERS:
             what = f"is {number}, expected 1 to {_MOST_OBSERVERS}"
             raise OptionError(Problem(option, what, "Invite more in a second run"))
-    described, engine = _open(experiment, database)
-    try:
+    with opened(experiment, database) as (described, engine):
         return invite_observers(
             engine,
             described,
@@ -96,8 +101,6 @@ def invite(
             simulated=simulated,
             viewing=viewing,
         )
-    finally:
-        engine.dispose()
 
 
 def export(
@@ -130,16 +133,14 @@ def export(
     file = Path(out)
     if file.suffix not in (".csv", ".json"):
         raise OptionError(Problem(str(file), "ends in neither .csv nor .json", "Choose one of them"))
-    described, engine = _open(experiment, database)
-    try:
+    with opened(experiment, database) as (described, engine):
         rows = answer_rows(engine)
         if file.suffix == ".csv":
             write_text(file, answers_csv(rows))
         else:
             write_json(file, answers_json(engine, described))
-    finally:
-        engine.dispose()
-    return ExportSummary(file, len(rows), len({row["observer"] for row in rows}))
+    observers = {row["observer"] for row in rows}
+    return ExportSummary(file, len(rows), len(observers), sum(map(is_simulated, observers)))
 
 
 def forget(experiment: str | PathLike[str], observer: str, *, database: str | None = None) -> int:
@@ -164,18 +165,29 @@ def forget(experiment: str | PathLike[str], observer: str, *, database: str | No
     ExperimentError
         If the experiment or its database cannot be used, or there is no such observer.
     """
-    _, engine = _open(experiment, database)
-    try:
+    with opened(experiment, database) as (_, engine):
         deleted = forget_observer(engine, observer)
-    finally:
-        engine.dispose()
     if not deleted:
         do = "The laboratory's page lists the observers"
         raise ExperimentError(Problem(f"observer {observer}", "is not known", do))
     return deleted
 
 
-def _open(experiment: str | PathLike[str], database: str | None) -> tuple[Experiment, Engine]:
+@contextmanager
+def opened(
+    experiment: str | PathLike[str], database: str | None, *, check_stimuli: bool = False
+) -> Iterator[tuple[Experiment, Engine]]:
+    """Give the description of an experiment and its open database, which is closed afterwards.
+
+    Raises
+    ------
+    ExperimentError
+        If either cannot be used; with `check_stimuli` also if a picture has changed.
+    """
     folder = Path(experiment)
-    described = read_experiment(folder, check_stimuli=False)
-    return described, open_database(database_url(database, folder), described)
+    described = read_experiment(folder, check_stimuli=check_stimuli)
+    engine = open_database(database_url(database, folder), described)
+    try:
+        yield described, engine
+    finally:
+        engine.dispose()

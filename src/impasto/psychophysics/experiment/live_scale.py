@@ -11,7 +11,7 @@ from impasto.psychophysics.experiment.answers import answer_rows
 from impasto.psychophysics.experiment.manifest import Experiment
 from impasto.psychophysics.scaling.comparisons import count_choices
 from impasto.psychophysics.scaling.likelihood import fit_likelihood
-from impasto.psychophysics.scaling.trials import Trial
+from impasto.psychophysics.scaling.trials import Trial, is_simulated
 
 _CHOICES = {"A": 1, "B": -1, "tie": 0}
 
@@ -44,6 +44,8 @@ class LiveScale:
     ----------
     answers, observers : int
         Practice, repeats and catch trials not counted.
+    simulated : int
+        How many of the observers are no persons.
     unit : str
     status : str
         Of the fit: ``converged``, or why there is no scale yet.
@@ -52,6 +54,7 @@ class LiveScale:
 
     answers: int
     observers: int
+    simulated: int
     unit: str
     status: str
     conditions: tuple[ScaledCondition, ...]
@@ -92,9 +95,11 @@ def live_scale(engine: Engine, experiment: Experiment) -> LiveScale:
     chosen = comparisons.counts
     asked = chosen + chosen.T
     columns = zip(names, chosen.sum(axis=1), asked.sum(axis=1), fit.scale, fit.standard_errors(), strict=True)
+    observers = {row["observer"] for row in rows}
     return LiveScale(
         answers=len(rows),
-        observers=len({row["observer"] for row in rows}),
+        observers=len(observers),
+        simulated=sum(map(is_simulated, observers)),
         unit="standard deviations of a difference",
         status=fit.status,
         conditions=tuple(

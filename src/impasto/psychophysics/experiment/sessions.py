@@ -19,6 +19,7 @@ from impasto.psychophysics.experiment.manifest import (
     Viewing,
     session_trials,
 )
+from impasto.psychophysics.scaling.trials import SIMULATED
 
 Side = Literal["left", "right", "tie"]
 
@@ -135,7 +136,7 @@ def invite_observers(
             ).scalar_one()
         )
         if again is None:
-            prefix = "simulated-" if simulated else "O"
+            prefix = f"{SIMULATED}-" if simulated else "O"
             names = [f"{prefix}{last + index + 1:03d}" for index in range(observers)]
             first_run = 1
             counted = update(about).where(about.c.key == "observers").values(value=str(last + observers))

@@ -175,9 +175,13 @@ def _trial(cells: Mapping[str, str]) -> Trial:
         side=cells.get("side", "").lower(),
         kind=cells.get("kind", "").lower() or "test",
         # A name that says so counts as well as a column: columns get lost when tables are merged.
-        simulated=cells.get("simulated", "").lower() in _YES
-        or cells["observer"].lower().startswith(SIMULATED),
+        simulated=cells.get("simulated", "").lower() in _YES or is_simulated(cells["observer"]),
     )
+
+
+def is_simulated(observer: str) -> bool:
+    """Return whether the name says that an observer is no person."""
+    return observer.lower().startswith(SIMULATED)
 
 
 def write_trials(path: str | PathLike[str], trials: Iterable[Trial]) -> None:
