@@ -58,7 +58,24 @@ def test_the_page_holds_the_errors_that_were_found(made):
 def test_each_step_is_announced_as_the_command_that_does_it(made):
     summary, said = made
     commands = [line.split()[2] for line in said if line.strip().startswith("$ impasto")]
-    assert commands == ["simulate", "stack", "fit", "evaluate", "render", "maps"] == list(summary.steps)
+    steps = ["simulate", "stack", "fit", "evaluate", "render", "maps", "experiment"]
+    assert list(dict.fromkeys(commands)) == [*steps, "scale"]
+    assert list(summary.steps) == steps
+
+
+def test_simulated_observers_judge_by_lights_that_no_fit_has_seen_and_are_named_simulated(made):
+    summary, said = made
+    compared = summary.compared
+    assert compared.created.angles == summary.evaluated.held_out
+    assert not any("used photographs that are references" in note for note in compared.created.notes)
+    assert compared.scaled.simulated == len(compared.simulated.observers) == 18
+    pooled = compared.scaled.groups[0]
+    assert pooled.answers == 18 * 5
+    page = summary.page.read_text(encoding="utf-8")
+    assert f"<td>{pooled.scale[0]:+.3f}</td>".replace("-", "−") in page
+    for match in re.finditer("observers", page):
+        assert "simulated" in page[max(0, match.start() - 200) : match.end() + 200].lower()
+    assert any(line.startswith("SIMULATED") for line in said)
 
 
 def test_a_demo_replaces_a_demo_and_nothing_else(made, tmp_path):

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from impasto.capture.simulate import simulate
+from impasto.demo import observers
 from impasto.demo.page import DemoSummary, write_page
 from impasto.errors import OutputError, Problem
 from impasto.evaluate import evaluate
@@ -23,7 +24,9 @@ from impasto.render import render
 from impasto.stack import stack
 from impasto.store import open_stack
 from impasto.summaries.evaluate import evaluate_tables
+from impasto.summaries.experiment import simulate_lines
 from impasto.summaries.fit import fit_lines
+from impasto.summaries.scale import scale_lines
 from impasto.summaries.stack import stack_lines
 
 MODELS = ("torrance-sparrow", "phong")
@@ -32,7 +35,10 @@ _LIGHTS = 45
 _HELD_OUT = 5
 _SWEEP_DEG = tuple(range(-66, 67, 6))
 # What an earlier demo left, and nothing else, may be replaced.
-_PARTS = ("photos", "painting.zarr", "painting.zarr.log.jsonl", "renderings", "maps", "index.html")
+_PARTS = (
+    *("photos", "painting.zarr", "painting.zarr.log.jsonl", "renderings", "maps", "index.html"),
+    *observers.PARTS,
+)
 _MARK = "demo.txt"
 
 
@@ -43,7 +49,7 @@ def demo(
     say: Callable[[str], None] = lambda line: None,
     show_progress: bool | None = None,
 ) -> DemoSummary:
-    """Simulate a painting, stack, fit two models, render, evaluate, and write a page about it.
+    """Simulate a painting, stack, fit two models, render, evaluate, compare, and write a page about it.
 
     Parameters
     ----------
@@ -117,6 +123,10 @@ def demo(
             maps(store, model=model, out=folder / "maps" / model, show_progress=show_progress)
             for model in MODELS
         ]
+    with clock.step("experiment", *observers.commands(store, folder, MODELS, held.names)):
+        compared = observers.compare(store, folder, MODELS, held.names, show_progress=show_progress)
+        for line in (*simulate_lines(compared.simulated), *scale_lines(compared.scaled)):
+            say(line)
     summary = DemoSummary(
         page=folder / "index.html",
         store=store,
@@ -126,6 +136,7 @@ def demo(
         rendered=tuple(rendered),
         mapped=tuple(mapped),
         exposure=exposure,
+        compared=compared,
         steps=clock.seconds,
         seconds=time.perf_counter() - started,
     )
@@ -141,8 +152,10 @@ class _Clock:
         self.seconds: dict[str, float] = {}
 
     @contextmanager
-    def step(self, name: str, command: str) -> Iterator[None]:
-        self._say(f"\n$ impasto {command}")
+    def step(self, name: str, *commands: str) -> Iterator[None]:
+        self._say("")
+        for command in commands:
+            self._say(f"$ impasto {command}")
         started = time.perf_counter()
         yield
         self.seconds[name] = time.perf_counter() - started

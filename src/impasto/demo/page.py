@@ -14,15 +14,17 @@ from numpy.typing import NDArray
 
 from impasto.colour import encode_srgb, quantise
 from impasto.console import versions
+from impasto.demo.observers import ObserversSummary
 from impasto.evaluate import EvaluateSummary
 from impasto.fit import FitSummary
 from impasto.maps import MapsSummary
-from impasto.page import Page, Picture
+from impasto.page import Page, Picture, Section
 from impasto.render import RenderSummary
 from impasto.stack import StackSummary
 from impasto.store import open_fit, open_stack
 from impasto.summaries.evaluate import evaluate_tables
-from impasto.summaries.words import percent, seconds
+from impasto.summaries.scale import scale_tables
+from impasto.summaries.words import count, percent, seconds
 
 _TITLES = {"torrance-sparrow": "Torrance-Sparrow", "phong": "Phong"}
 _SHOWN_MAPS = ("normal", "diffuse", "specular", "c", "c_sd", "normal_sd", "status", "residual_rms")
@@ -48,6 +50,8 @@ class DemoSummary:
         One entry per model.
     exposure : float
         Factor on the radiance in the pictures of the held-out lights.
+    compared : ObserversSummary
+        What simulated observers chose.
     steps : dict of str to float
         Seconds that each step took.
     seconds : float
@@ -61,6 +65,7 @@ class DemoSummary:
     rendered: tuple[RenderSummary, ...]
     mapped: tuple[MapsSummary, ...]
     exposure: float
+    compared: ObserversSummary
     steps: dict[str, float]
     seconds: float
 
@@ -143,6 +148,7 @@ def write_page(summary: DemoSummary, truth: Path) -> None:
     )
 
     part.notes("Assumed or left out", [*stacked.notes, *summary.fitted.notes])
+    _write_observers(page.section("To the eyes of simulated observers"), summary.compared)
     part = page.section("The same by hand")
     part.commands(
         (
@@ -152,6 +158,10 @@ def write_page(summary: DemoSummary, truth: Path) -> None:
             "impasto evaluate painting.zarr --held-out 5",
             "impasto render painting.zarr --model torrance-sparrow --arm -66:66:6 --out film/",
             "impasto maps painting.zarr --model torrance-sparrow --out maps/",
+            "impasto experiment create painting.zarr --out experiment/",
+            "impasto experiment simulate experiment/",
+            "impasto experiment export experiment/ trials.csv",
+            "impasto scale trials.csv --errors experiment/ --out scales/",
         )
     )
     part = page.section("How it was made")
@@ -162,6 +172,31 @@ def write_page(summary: DemoSummary, truth: Path) -> None:
     )
     part.text(versions())
     page.write(summary.page)
+
+
+def _write_observers(part: Section, compared: ObserversSummary) -> None:
+    """Write what simulated observers chose, and that they are no persons."""
+    simulated, scaled = compared.simulated, compared.scaled
+    part.text(
+        f"SIMULATED: {count(len(simulated.observers), 'observer')} who are a program, not people, compared "
+        "the two renderings with the photograph under each of the lights that the fits have not seen, and "
+        f"chose the one with the smaller {simulated.by} difference as they saw it through noise. Their "
+        "answers went the way of real ones, from the stimuli to the scale; they say nothing about what "
+        "people see."
+    )
+    figures = {file.stem: file.read_bytes() for file in scaled.files if file.suffix == ".png"}
+    whose = "of simulated observers"
+    part.pictures(
+        [
+            Picture(figures["scale-by-angle"], f"Choices {whose} as an interval scale, by light and pooled"),
+            Picture(figures["proportions-pooled"], f"Shares of the choices {whose}, over all lights"),
+        ],
+        columns=2,
+    )
+    caption = f"Does a measured difference predict the choices {whose}?"
+    part.pictures([Picture(figures["physical-errors"], caption)], columns=1)
+    heading, header, rows, _ = next(scale_tables(scaled))
+    part.table(header, rows, caption=f"Simulated observers, {heading}")
 
 
 def _held_out_pictures(summary: DemoSummary) -> Iterator[list[Picture]]:
