@@ -80,7 +80,8 @@ def take_part(address: str, code: str, seed: int) -> tuple[list[str], list[str]]
     judge = random.Random(seed)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
-        observer = Observer(browser.new_page(viewport={"width": 1280, "height": 800}), address, code)
+        observer = Observer(browser.new_page(viewport={"width": 1280, "height": 800}), address)
+        observer.open(code)
         observer.reach_the_trials()
         while observer.wait_until_asked():
             left, right = observer.page.evaluate(DIFFERENCES)

@@ -69,10 +69,22 @@ class ServerProcess:
         self.kill()
 
 
+def fill_in(page: Page) -> None:
+    """Fill in whatever the card that is shown asks for."""
+    if page.locator("[name=agreed]").count():
+        page.locator("[name=agreed]").check()
+    for name, text in (("display", "a display of no make"), ("distance_mm", "700"), ("gamma", "2.2")):
+        if page.locator(f"[name={name}]").count():
+            page.locator(f"[name={name}]").fill(text)
+    for name, answer in (("dark", "7"), ("bright", "8"), ("neutral", "yes")):
+        if page.locator(f"[name={name}]").count():
+            page.locator(f"[name={name}]").select_option(answer)
+
+
 class Observer:
     """Goes through the page of a session in a browser, and notes what was answered."""
 
-    def __init__(self, page: Page, address: str, code: str) -> None:
+    def __init__(self, page: Page, address: str) -> None:
         self.page = page
         self.elsewhere: list[str] = []
         self.faults: list[str] = []
@@ -80,7 +92,10 @@ class Observer:
         self._address = address
         page.on("request", lambda request: self._note(request.url))
         page.on("pageerror", lambda error: self.faults.append(str(error)))
-        page.goto(f"{address}/#{code}")
+
+    def open(self, code: str) -> None:
+        """Open the page of a session."""
+        self.page.goto(f"{self._address}/#{code}")
 
     def _note(self, url: str) -> None:
         if not url.startswith((self._address, "blob:", "data:")):
@@ -95,15 +110,7 @@ class Observer:
             if page.locator(".picture").count():
                 return
             title = heading.inner_text()
-            if page.locator("[name=agreed]").count():
-                page.locator("[name=agreed]").check()
-            if title == "Viewing conditions":
-                page.locator("[name=display]").fill("a display of no make")
-                page.locator("[name=distance_mm]").fill("700")
-            if title == "Check of the display":
-                for name, answer in (("dark", "7"), ("bright", "8"), ("neutral", "yes")):
-                    page.locator(f"[name={name}]").select_option(answer)
-                page.locator("[name=gamma]").fill("2.2")
+            fill_in(page)
             page.locator("button[type=submit]").click()
             page.wait_for_function("title => document.querySelector('h1')?.innerText !== title", arg=title)
 

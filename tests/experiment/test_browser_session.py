@@ -49,7 +49,8 @@ def test_a_session_survives_reload_lost_network_and_kill(
     server, page, experiment, experiment_folder, database, tmp_path
 ):
     (invitation,) = impasto.experiment.invite(experiment_folder, database=database)
-    observer = Observer(page, server.address, invitation.code)
+    observer = Observer(page, server.address)
+    observer.open(invitation.code)
     observer.reach_the_trials()
 
     sides = itertools.cycle(["left", "right", "right", "tie"])
@@ -78,7 +79,8 @@ def test_a_session_survives_reload_lost_network_and_kill(
             server.start()
             page = page.context.new_page()
             given = observer.given
-            observer = Observer(page, server.address, invitation.code)
+            observer = Observer(page, server.address)
+            observer.open(invitation.code)
             observer.given = given
             observer.reach_the_trials()
         elif number == 8:  # the server comes back while the page waits

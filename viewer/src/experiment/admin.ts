@@ -53,7 +53,7 @@ class Laboratory {
       ...(body ? { body: JSON.stringify(body) } : {}),
     });
     if (!response.ok)
-      throw new Error(response.status === 401 ? "this token is not valid" : response.statusText);
+      throw new Error(response.status === 401 ? "This token is not valid" : response.statusText);
     return response;
   }
 
@@ -108,7 +108,7 @@ function sessionTable(states: SessionState[], forget: (observer: string) => void
 }
 
 function scaleTable(scale: LiveScale): HTMLElement {
-  const shown = (value: number | null) => (value === null ? "–" : value.toFixed(2));
+  const shown = (value: number | null) => (value === null ? "–" : value.toFixed(2).replace("-", "−"));
   const simulated = scale.simulated > 0 ? `, ${scale.simulated} of them SIMULATED` : "";
   return make(
     "div",

@@ -203,8 +203,9 @@ class Comparison {
     this.tooSmall.textContent = `The pictures need a window of ${Math.ceil(needed.width)} × ${Math.ceil(needed.height)}; \
 this one has ${inner.width} × ${inner.height}. Please enlarge it, with the key F11 for instance.`;
     this.root.classList.toggle("hidden-pictures", !this.fits);
-    if (!this.fits) this.ready = false;
-    else if (this.since > 0) this.allow();
+    if (this.fits && this.since > 0) this.allow();
+    else this.ready = false;
+    for (const button of this.choices) button.disabled = !this.ready;
   }
 
   private answer(choice: Choice, input: Answer["window"]["input"]): Answer {

@@ -133,6 +133,9 @@ async function run(): Promise<void> {
 }
 
 run().catch((error: unknown) => {
+  if (error instanceof Refused && error.status === 401) {
+    return tell("The laboratory has deleted this session, with its answers. Please call the experimenter.");
+  }
   const reason = error instanceof Error ? error.message : String(error);
   tell(`The page cannot go on: ${reason}. Your answers so far are stored. Please call the experimenter.`);
 });
