@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import UnivariateSpline
 
 Array = NDArray[np.float64]
 
@@ -106,6 +105,8 @@ def fit_response(code: Array, sd: Array, radiance: Array, black: Array, largest:
     A cubic smoothing spline of the logarithm of the radiance against that of the code above black, in which a
     linear response and a power are straight lines.
     """
+    from scipy.interpolate import UnivariateSpline  # long to import, and not used to apply a response
+
     channels = code.shape[1]
     radiance = np.broadcast_to(np.reshape(radiance, (len(code), -1)), code.shape)
     nodes, values, measured = [], [], []

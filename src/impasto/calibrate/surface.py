@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RectBivariateSpline
 
 Array = NDArray[np.float64]
 
@@ -36,6 +35,8 @@ def smooth_surface(image: NDArray[np.floating]) -> tuple[Array, Array]:
     residual : ndarray of shape (C,)
         Root mean square relative difference of the cells' means from it.
     """
+    from scipy.interpolate import RectBivariateSpline  # long to import, and not used to apply a surface
+
     height, width, channels = image.shape
     rows, columns = (
         np.linspace(0, length, min(cells, length) + 1).astype(int)
