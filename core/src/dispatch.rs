@@ -9,14 +9,14 @@ use crate::lanes::{FUSED, Isa, LANES, PLAIN, WIDE, outlined};
 use crate::models::{Model, Optics, ShapeParameter};
 use crate::observations::Stack;
 use crate::paper::{PaperFit, Sample};
-use crate::record::{FitGroup, Layout};
+use crate::record::{FitBlock, Layout};
 use crate::render::{Parameters, View, render_group};
 use crate::slopes;
 use rayon::prelude::*;
 use std::sync::LazyLock;
 
 /// Pixels that one thread takes at a time: enough to hide the start of a task, few enough to share a tile evenly.
-const BLOCK: usize = 32 * LANES;
+pub const BLOCK: usize = 32 * LANES;
 
 /// Channels that the fit is compiled for: stacks of fewer leave the rest without weight.
 pub const MAX_CHANNELS: usize = 3;
@@ -106,7 +106,7 @@ macro_rules! with_instructions {
 
 /// Fits a tile with all threads, each with a fit that `make` makes; `fit_block` fits the pixels of a block.
 #[inline]
-fn fit_tile<F: FitGroup>(
+fn fit_tile<F: FitBlock>(
     pixels: usize,
     layout: Layout,
     make: impl Fn() -> F + Sync + Send,
@@ -118,14 +118,6 @@ fn fit_tile<F: FitGroup>(
     let blocks = rows.par_chunks_mut(BLOCK * width).zip(status.par_chunks_mut(BLOCK)).enumerate();
     blocks.for_each_init(make, |fit, (block, (rows, status))| fit_block(fit, block * BLOCK, rows, status));
     Fitted { layout, rows, status }
-}
-
-#[inline(always)]
-fn fit_groups<const ISA: Isa, F: FitGroup>(fit: &mut F, first: usize, rows: &mut [f32], status: &mut [u8]) {
-    let width = fit.layout().width();
-    for (group, (rows, status)) in rows.chunks_mut(LANES * width).zip(status.chunks_mut(LANES)).enumerate() {
-        fit.fit_group(first + group * LANES, rows, status);
-    }
 }
 
 macro_rules! dispatch {
@@ -149,7 +141,7 @@ macro_rules! dispatch {
                 ) {
                     outlined::<ISA, _>(
                         #[inline(always)]
-                        || fit_groups::<ISA, _>(fit, first, rows, status),
+                        || fit.fit_block(first, rows, status),
                     )
                 }
 
@@ -280,7 +272,7 @@ macro_rules! dispatch {
         ) {
             outlined::<ISA, _>(
                 #[inline(always)]
-                || fit_groups::<ISA, _>(fit, first, rows, status),
+                || fit.fit_block(first, rows, status),
             )
         }
 

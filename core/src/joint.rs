@@ -8,7 +8,7 @@ use crate::minimise::{Objective, Outcome, inverse, minimise};
 use crate::models::{MAX_SHAPE, Model, Optics};
 use crate::number::{Mask, Number, Real, array};
 use crate::observations::{Group, Stack};
-use crate::record::{FitGroup, Layout, Row, Status};
+use crate::record::{FitBlock, Layout, Row, Status, groups};
 use crate::robust::Loss;
 use crate::separable::{Point, Scratch, Separable, Solution, propagated};
 use crate::start::{ASIDE, Grey, aside, candidates, doubt_shadows, grey, start, start_at, starts};
@@ -68,13 +68,23 @@ impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: u
     }
 }
 
-impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize> FitGroup
+impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize> FitBlock
     for JointFit<'_, M, ISA, C, P, L>
 {
     fn layout(&self) -> Layout {
         Self::layout(self.stack.channels, self.options.ambient)
     }
 
+    #[inline(always)]
+    fn fit_block(&mut self, first: usize, rows: &mut [f32], status: &mut [u8]) {
+        let width = FitBlock::layout(self).width();
+        for (first, rows, status) in groups(first, width, rows, status) {
+            self.fit_group(first, rows, status);
+        }
+    }
+}
+
+impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize> JointFit<'_, M, ISA, C, P, L> {
     #[inline(always)]
     fn fit_group(&mut self, first: usize, rows: &mut [f32], status: &mut [u8]) {
         self.group.gather(self.stack, first);
@@ -147,7 +157,7 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
 
         let channels = self.stack.channels;
         let ambients = if ambient { channels } else { 0 };
-        let width = FitGroup::layout(self).width();
+        let width = FitBlock::layout(self).width();
         for (lane, status) in status.iter_mut().enumerate() {
             *status = if !wanted.holds(lane) {
                 if self.group.clipped.0[lane] > 0.0 && self.group.usable_lights.0[lane] == 0.0 {

@@ -254,6 +254,11 @@ impl LaneMask {
     pub fn holds(self, lane: usize) -> bool {
         self.0[lane] != 0
     }
+
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, holds: bool) {
+        self.0[lane] = if holds { u32::MAX } else { 0 };
+    }
 }
 
 impl Mask for LaneMask {

@@ -1,9 +1,9 @@
 //! Bounded Levenberg-Marquardt, independent problems side by side.
 //!
 //! [Levenberg1944], [Marquardt1963]; damping scaled by the Hessian's diagonal. Each lane has its own damping and stops on its
-//! own; finished lanes keep their point while the others go on (repacking them gained nothing).
+//! own; finished lanes keep their point while the others go on, or take the next of a queue of problems.
 
-use crate::lanes::{Isa, Lane, LaneMask, outlined};
+use crate::lanes::{Isa, LANES, Lane, LaneMask, outlined};
 use crate::number::{Mask, Number, Real};
 
 /// A cost, half its descent direction and the Gauss-Newton approximation of half its Hessian at a point.
@@ -82,41 +82,130 @@ fn minimise_inline<const ISA: Isa, const P: usize, O: Objective<ISA, P>>(
     wanted: LaneMask,
     max_steps: usize,
 ) -> Outcome<O::Point, ISA> {
-    let mut point = *start;
-    let mut trial_point = *start;
-    let mut current = Quadratic::zero();
-    current.cost = Lane::splat(f64::from(f32::MAX));
-    let mut damping = Lane::splat(1e-3);
-    let mut active = wanted;
-    // The start itself is the first trial, which every lane accepts.
+    let mut search = Search::begin(start, wanted);
+    // The start itself is the first trial.
     for _ in 0..=max_steps {
-        let trial = objective.quadratic(&trial_point);
-        let better = trial.cost.lt(current.cost) & active;
-        let settled = (trial.cost - current.cost).abs().lt(current.cost * Lane::splat(TOLERANCE));
-        let raised = (damping * Lane::splat(8.0)).max(Lane::splat(0.1));
-        let lowered = (damping * Lane::splat(0.1)).max(Lane::splat(1e-7));
-        damping = Lane::select(better, lowered, raised);
+        search.step(objective);
+        if !search.active.any() {
+            break;
+        }
+    }
+    Outcome { point: search.point, cost: search.current.cost, converged: wanted & !search.active }
+}
 
-        point = O::select(better, &trial_point, &point);
-        current = Quadratic::select(better, &trial, &current);
-        objective.accepted(&point, better);
+/// Problems that are waiting, of which each lane takes the next when it has done with one.
+pub trait Queue<const ISA: Isa, const P: usize>: Objective<ISA, P> {
+    /// Makes the next problem that of a lane, and its start the lane's point; false when none is left.
+    fn next(&mut self, lane: usize, point: &mut Self::Point) -> bool;
+    /// Takes the outcome of the problem that a lane had.
+    fn finish(&mut self, lane: usize, outcome: &Outcome<Self::Point, ISA>);
+}
+
+/// Minimises every problem of a queue. No lane waits for the slowest of the others, as it does in `minimise`.
+#[inline(always)]
+pub fn minimise_all<const ISA: Isa, const P: usize, O: Queue<ISA, P>>(
+    queue: &mut O,
+    anywhere: &O::Point,
+    max_steps: usize,
+) {
+    outlined::<ISA, _>(
+        #[inline(always)]
+        || minimise_all_inline(queue, anywhere, max_steps),
+    )
+}
+
+#[inline(always)]
+fn minimise_all_inline<const ISA: Isa, const P: usize, O: Queue<ISA, P>>(
+    queue: &mut O,
+    anywhere: &O::Point,
+    max_steps: usize,
+) {
+    let mut search = Search::begin(anywhere, LaneMask::NONE);
+    let mut busy = [false; LANES];
+    let mut steps = [0; LANES];
+    loop {
+        let outcome = Outcome { point: search.point, cost: search.current.cost, converged: !search.active };
+        let mut begun = LaneMask::NONE;
+        for lane in 0..LANES {
+            if search.active.holds(lane) && steps[lane] <= max_steps {
+                continue;
+            }
+            if busy[lane] {
+                queue.finish(lane, &outcome);
+            }
+            busy[lane] = queue.next(lane, &mut search.trial_point);
+            search.active.set(lane, busy[lane]);
+            begun.set(lane, busy[lane]);
+            steps[lane] = 0;
+        }
+        if !search.active.any() {
+            return;
+        }
+        search.restart::<O>(begun);
+        search.step(queue);
+        for count in &mut steps {
+            *count += 1;
+        }
+    }
+}
+
+/// Where the lanes of a minimisation are.
+struct Search<Point, const ISA: Isa, const P: usize> {
+    /// The best point so far, and the quadratic there.
+    point: Point,
+    current: Quadratic<ISA, P>,
+    /// The point to look at next.
+    trial_point: Point,
+    damping: Lane<ISA>,
+    active: LaneMask,
+}
+
+const FIRST_DAMPING: f64 = 1e-3;
+/// Before the first trial, which every lane accepts.
+const UNKNOWN_COST: f64 = f32::MAX as f64;
+
+impl<Point: Copy, const ISA: Isa, const P: usize> Search<Point, ISA, P> {
+    #[inline(always)]
+    fn begin(start: &Point, active: LaneMask) -> Self {
+        let mut current = Quadratic::zero();
+        current.cost = Lane::splat(UNKNOWN_COST);
+        Search { point: *start, current, trial_point: *start, damping: Lane::splat(FIRST_DAMPING), active }
+    }
+
+    /// Begins anew in some lanes, from their trial points.
+    #[inline(always)]
+    fn restart<O: Objective<ISA, P, Point = Point>>(&mut self, lanes: LaneMask) {
+        self.point = O::select(lanes, &self.trial_point, &self.point);
+        self.current.cost = Lane::select(lanes, Lane::splat(UNKNOWN_COST), self.current.cost);
+        self.damping = Lane::select(lanes, Lane::splat(FIRST_DAMPING), self.damping);
+    }
+
+    /// Looks at the trial points, and makes the next of those lanes that go on.
+    #[inline(always)]
+    fn step<O: Objective<ISA, P, Point = Point>>(&mut self, objective: &mut O) {
+        let trial = objective.quadratic(&self.trial_point);
+        let better = trial.cost.lt(self.current.cost) & self.active;
+        let settled = (trial.cost - self.current.cost).abs().lt(self.current.cost * Lane::splat(TOLERANCE));
+        let raised = (self.damping * Lane::splat(8.0)).max(Lane::splat(0.1));
+        let lowered = (self.damping * Lane::splat(0.1)).max(Lane::splat(1e-7));
+        self.damping = Lane::select(better, lowered, raised);
+
+        self.point = O::select(better, &self.trial_point, &self.point);
+        self.current = Quadratic::select(better, &trial, &self.current);
+        objective.accepted(&self.point, better);
         // Damping beyond this bound means that no step, however short, lowers the cost: a kink or a flat valley.
-        let stuck = damping.gt(Lane::splat(1e7));
-        let blocked = objective.blocked(&point, &current.descent);
-        let step = damped_step(&current, damping, &blocked);
+        let stuck = self.damping.gt(Lane::splat(1e7));
+        let blocked = objective.blocked(&self.point, &self.current.descent);
+        let step = damped_step(&self.current, self.damping, &blocked);
         // To first order the step lowers the cost by twice this, to second order by this: too little to be worth a look.
         let mut promised = Lane::splat(0.0);
         for i in 0..P {
-            promised = step[i].mul_add(current.descent[i], promised);
+            promised = step[i].mul_add(self.current.descent[i], promised);
         }
-        let vain = promised.lt(current.cost * Lane::splat(TOLERANCE));
-        active = active & !(settled | stuck | vain);
-        if !active.any() {
-            break;
-        }
-        trial_point = objective.moved(&point, &step);
+        let vain = promised.lt(self.current.cost * Lane::splat(TOLERANCE));
+        self.active = self.active & !(settled | stuck | vain);
+        self.trial_point = objective.moved(&self.point, &step);
     }
-    Outcome { point, cost: current.cost, converged: wanted & !active }
 }
 
 /// Solves (H + damping · diag H) step = descent by LDLᵀ, with blocked parameters held.

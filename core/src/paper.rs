@@ -5,15 +5,16 @@
 //! free, φv = 0 and the diffuse term held. In its refined form the view is the calibrated one, and Ad, θn, φn and the shape
 //! are fitted over all lights with As held.
 
+use crate::dispatch::BLOCK;
 use crate::geometry::{Illumination, dot, normalise};
 use crate::joint::Options;
-use crate::lanes::{Isa, Lane, LaneMask};
-use crate::minimise::{Outcome, minimise};
+use crate::lanes::{Isa, LANES, Lane, LaneMask};
+use crate::minimise::minimise;
 use crate::models::{Basis, Lambert, MAX_SHAPE, Model, Optics, ShapeParameter};
 use crate::number::{Number, Real, array};
 use crate::observations::{Group, Stack};
-use crate::paper_shape::{Remainder, ShapeFit, Tilts};
-use crate::record::{FitGroup, Layout, Row, Status};
+use crate::paper_shape::{Left, ShapeFit, ShapeQueue, Waiting};
+use crate::record::{FitBlock, Layout, Row, Status, groups};
 use crate::robust::Loss;
 use crate::separable::{Point, Scratch, Separable};
 use crate::start::{Grey, diffuse_normal, grey};
@@ -63,6 +64,7 @@ impl Model for UniformAmbient {
 }
 
 /// The result of the diffuse stage.
+#[derive(Clone, Copy)]
 struct Diffuse<const ISA: Isa, const C: usize> {
     normal: [Lane<ISA>; 3],
     magnitude: [Lane<ISA>; C],
@@ -70,6 +72,9 @@ struct Diffuse<const ISA: Isa, const C: usize> {
     /// Pixels with as many lights outside the threshold as the stage has unknowns.
     enough: LaneMask,
     converged: LaneMask,
+    /// Usable samples of all lights and channels.
+    samples: Lane<ISA>,
+    all_clipped: LaneMask,
 }
 
 pub struct PaperFit<'a, M, const ISA: Isa, const C: usize> {
@@ -81,7 +86,10 @@ pub struct PaperFit<'a, M, const ISA: Isa, const C: usize> {
     /// The group with the lights near the highlight left out.
     far: Group<ISA, C>,
     grey: Vec<Grey<ISA>>,
-    remainders: Vec<Remainder<ISA>>,
+    left: Left<ISA>,
+    /// Groups of a block whose diffuse stage is done, and whose shape is to be fitted.
+    diffuse: Vec<Diffuse<ISA, C>>,
+    waiting: Vec<Waiting<ISA>>,
     diffuse_scratch: Scratch<ISA, C, 2>,
     scratch: Scratch<ISA, C, 3>,
     model: PhantomData<M>,
@@ -100,7 +108,11 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
             group: Group::new(stack, options.optics.index),
             far: Group::new(stack, options.optics.index),
             grey: Vec::with_capacity(stack.lights.len()),
-            remainders: Vec::with_capacity(stack.lights.len()),
+            left: Left::new(stack.lights.len()),
+            diffuse: Vec::with_capacity(BLOCK / LANES),
+            waiting: (0..if sample.refined { 0 } else { BLOCK / LANES })
+                .map(|_| Waiting::new(stack.lights.len()))
+                .collect(),
             diffuse_scratch: Scratch::new(stack.lights.len()),
             scratch: Scratch::new(stack.lights.len()),
             model: PhantomData,
@@ -165,59 +177,73 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
             ambient: solution.magnitudes.specular[0],
             enough,
             converged: outcome.converged,
+            samples: self.group.usable_samples,
+            all_clipped: self.group.clipped.positive() & !self.group.usable_lights.positive(),
         }
     }
 
-    /// Step 5, literally.
+    /// Steps 2 and 3 for a group.
     #[inline(always)]
-    fn fit_shape(&mut self, diffuse: &Diffuse<ISA, C>) -> Shape<ISA, C> {
-        let mut problem = ShapeFit::<M, ISA>::new(
-            &self.group,
-            diffuse.normal,
-            diffuse.magnitude,
-            self.colour,
-            Lane::splat(self.sample.specular),
-            self.options.optics,
-            &mut self.remainders,
-        );
-        let begin = problem.start();
-        let outcome: Outcome<Tilts<ISA>, ISA> = minimise(&mut problem, &begin, diffuse.enough, self.options.max_steps);
-        let normal = problem.normal(outcome.point.phi);
+    fn first_stage(&mut self, first: usize) -> Diffuse<ISA, C> {
+        self.group.gather(self.stack, first);
+        grey(&self.group, &mut self.grey);
+        self.leave_out_highlight();
+        grey(&self.far, &mut self.grey);
+        let diffuse = if self.options.ambient {
+            self.fit_diffuse::<UniformAmbient>([Lane::splat(1.0); C])
+        } else {
+            self.fit_diffuse::<Lambert>(self.colour)
+        };
+        // From here on the ambient term is known: what remains is diffuse and specular.
+        for observation in &mut self.group.observations {
+            for k in 0..C {
+                observation.radiance[k] = observation.radiance[k] - diffuse.ambient;
+            }
+        }
+        diffuse
+    }
+
+    #[inline(always)]
+    fn shape_fit<'b>(&self, illuminations: &'b [Illumination<Lane<ISA>>]) -> ShapeFit<'b, M, ISA> {
+        ShapeFit::new(illuminations, Lane::splat(self.sample.specular), self.options.optics)
+    }
+
+    /// Step 5, literally, for all groups of a block.
+    #[inline(always)]
+    fn fit_shapes(&mut self) {
+        let fit =
+            ShapeFit::<M, ISA>::new(&self.group.illuminations, Lane::splat(self.sample.specular), self.options.optics);
+        let waiting = &mut self.waiting[..self.diffuse.len()];
+        ShapeQueue::run(fit, waiting, &mut self.left, self.options.max_steps);
+    }
+
+    /// What step 5 found for a group.
+    #[inline(always)]
+    fn shape_of(&self, diffuse: &Diffuse<ISA, C>, found: &Waiting<ISA>) -> Shape<ISA, C> {
+        let normal = found.left.normal(found.point.phi);
         // Ad cos φn is what the diffuse stage saw, as its φn was 0.
         let in_plane = (normal[0] * normal[0] + normal[2] * normal[2]).sqrt();
         let scale = (diffuse.normal[0] * diffuse.normal[0] + diffuse.normal[2] * diffuse.normal[2]).sqrt() / in_plane;
         Shape {
             normal,
             magnitude: array!(|k| diffuse.magnitude[k] * scale),
-            shape_log: outcome.point.shape_log,
-            view_tilt: outcome.point.view,
-            cost: outcome.cost,
-            converged: outcome.converged,
-            at_bound: problem.at_bound(&outcome.point),
+            shape_log: found.point.shape_log,
+            view_tilt: found.point.view,
+            cost: found.cost,
+            converged: found.converged,
+            at_bound: self.shape_fit(&self.group.illuminations).at_bound(&found.point),
         }
     }
 
     /// The refined form of steps 3 and 5.
     #[inline(always)]
     fn refine(&mut self, diffuse: &Diffuse<ISA, C>) -> Shape<ISA, C> {
-        let optics = self.options.optics;
-        let specular = [Lane::splat(self.sample.specular)];
-        let begin = {
-            let problem = ShapeFit::<M, ISA>::new(
-                &self.group,
-                diffuse.normal,
-                diffuse.magnitude,
-                self.colour,
-                specular[0],
-                optics,
-                &mut self.remainders,
-            );
-            problem.start_out_of_plane()
-        };
+        self.left.take(&self.group, diffuse.normal, diffuse.magnitude, self.colour);
+        let begin = self.shape_fit(&self.group.illuminations).start_out_of_plane(&self.left);
         let mut problem: Separable<'_, M, ISA, C, 3> =
             Separable::new(&self.group, self.colour, self.options.optics, Loss::Linear, false, &mut self.scratch);
         problem.prior = false;
-        problem.fixed_specular = Some(specular);
+        problem.fixed_specular = Some([Lane::splat(self.sample.specular)]);
         let outcome = minimise(&mut problem, &begin, diffuse.enough, self.options.max_steps);
         let solution = problem.solve(&outcome.point);
         let at_bound = problem.at_bound(&outcome.point, &solution.magnitudes);
@@ -237,20 +263,12 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
     #[inline(always)]
     fn write(&self, diffuse: &Diffuse<ISA, C>, fitted: &Shape<ISA, C>, rows: &mut [f32], status: &mut [u8]) {
         let channels = self.stack.channels;
-        let width = FitGroup::layout(self).width();
-        let mut samples = Lane::splat(0.0);
-        for observation in &self.group.observations {
-            for k in 0..C {
-                let usable = observation.weight[k].positive();
-                samples = samples + Lane::select(usable, Lane::splat(1.0), Lane::splat(0.0));
-            }
-        }
-        let rms = (fitted.cost / samples.max(Lane::splat(1.0))).sqrt();
+        let width = FitBlock::layout(self).width();
+        let rms = (fitted.cost / diffuse.samples.max(Lane::splat(1.0))).sqrt();
         for (lane, status) in status.iter_mut().enumerate() {
             let row = &mut rows[lane * width..(lane + 1) * width];
             if !diffuse.enough.holds(lane) {
-                let clipped = self.group.clipped.0[lane] > 0.0 && self.group.usable_lights.0[lane] == 0.0;
-                *status = if clipped { Status::AllClipped } else { Status::TooFewLights } as u8;
+                *status = if diffuse.all_clipped.holds(lane) { Status::AllClipped } else { Status::TooFewLights } as u8;
                 row.fill(f32::NAN);
                 continue;
             }
@@ -282,30 +300,38 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
     }
 }
 
-impl<M: Model, const ISA: Isa, const C: usize> FitGroup for PaperFit<'_, M, ISA, C> {
+impl<M: Model, const ISA: Isa, const C: usize> FitBlock for PaperFit<'_, M, ISA, C> {
     fn layout(&self) -> Layout {
         Layout::paper(self.stack.channels)
     }
 
     #[inline(always)]
-    fn fit_group(&mut self, first: usize, rows: &mut [f32], status: &mut [u8]) {
-        self.group.gather(self.stack, first);
-        grey(&self.group, &mut self.grey);
-        self.leave_out_highlight();
-        grey(&self.far, &mut self.grey);
-        let diffuse = if self.options.ambient {
-            self.fit_diffuse::<UniformAmbient>([Lane::splat(1.0); C])
-        } else {
-            self.fit_diffuse::<Lambert>(self.colour)
-        };
-        // From here on the ambient term is known: what remains is diffuse and specular.
-        for observation in &mut self.group.observations {
-            for k in 0..C {
-                observation.radiance[k] = observation.radiance[k] - diffuse.ambient;
+    fn fit_block(&mut self, first: usize, rows: &mut [f32], status: &mut [u8]) {
+        let width = FitBlock::layout(self).width();
+        self.diffuse.clear();
+        for (number, (first, rows, status)) in groups(first, width, rows, status).enumerate() {
+            let diffuse = self.first_stage(first);
+            if self.sample.refined {
+                let fitted = self.refine(&diffuse);
+                self.write(&diffuse, &fitted, rows, status);
+                continue;
             }
+            let fit = self.shape_fit(&self.group.illuminations);
+            let waiting = &mut self.waiting[number];
+            waiting.left.take(&self.group, diffuse.normal, diffuse.magnitude, self.colour);
+            waiting.wanted = diffuse.enough;
+            waiting.point = fit.start(&waiting.left);
+            self.diffuse.push(diffuse);
         }
-        let fitted = if self.sample.refined { self.refine(&diffuse) } else { self.fit_shape(&diffuse) };
-        self.write(&diffuse, &fitted, rows, status);
+        if self.sample.refined {
+            return;
+        }
+        self.fit_shapes();
+        for (number, (_, rows, status)) in groups(first, width, rows, status).enumerate() {
+            let diffuse = self.diffuse[number];
+            let fitted = self.shape_of(&diffuse, &self.waiting[number]);
+            self.write(&diffuse, &fitted, rows, status);
+        }
     }
 }
 

@@ -5,8 +5,8 @@
 
 use crate::dual::{Dual, Steered};
 use crate::geometry::{Illumination, dot, normalise};
-use crate::lanes::{Isa, Lane, LaneMask, outlined};
-use crate::minimise::{Objective, Quadratic};
+use crate::lanes::{Isa, LANES, Lane, LaneMask, outlined};
+use crate::minimise::{Objective, Outcome, Quadratic, Queue, minimise_all};
 use crate::models::{MAX_SHAPE, MAX_STARTS, Model, Optics};
 use crate::number::{Number, Real, array};
 use crate::observations::Group;
@@ -20,11 +20,20 @@ const PHI_MAX: f64 = 0.7;
 /// Out-of-plane tilts that the search starts from, radians.
 const PHI_STARTS: [f64; 3] = [0.0, 0.04, 0.12];
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Tilts<const ISA: Isa> {
     pub view: Lane<ISA>,
     pub shape_log: Lane<ISA>,
     pub phi: Lane<ISA>,
+}
+
+impl<const ISA: Isa> Tilts<ISA> {
+    #[inline(always)]
+    fn copy_lane(&mut self, lane: usize, from: &Self, pixel: usize) {
+        self.view.0[lane] = from.view.0[pixel];
+        self.shape_log.0[lane] = from.shape_log.0[pixel];
+        self.phi.0[lane] = from.phi.0[pixel];
+    }
 }
 
 /// What the diffuse term leaves of one light's samples, all channels in one.
@@ -37,12 +46,76 @@ pub struct Remainder<const ISA: Isa> {
     weight: Lane<ISA>,
 }
 
-pub struct ShapeFit<'a, M, const ISA: Isa> {
-    illuminations: &'a [Illumination<Lane<ISA>>],
-    remainders: &'a [Remainder<ISA>],
+/// What the diffuse stage leaves of a group of pixels for the shape to explain.
+#[derive(Clone)]
+pub struct Left<const ISA: Isa> {
+    remainders: Vec<Remainder<ISA>>,
     /// The part of the cost that no lobe changes.
     constant: Lane<ISA>,
     normal: [Lane<ISA>; 3],
+}
+
+impl<const ISA: Isa> Left<ISA> {
+    pub fn new(lights: usize) -> Self {
+        let zero = Lane::splat(0.0);
+        Left { remainders: vec![Remainder { value: zero, weight: zero }; lights], constant: zero, normal: [zero; 3] }
+    }
+
+    /// `magnitude` is the diffuse stage's; the diffuse term keeps the normal of that stage.
+    #[inline(always)]
+    pub fn take<const C: usize>(
+        &mut self,
+        group: &Group<ISA, C>,
+        normal: [Lane<ISA>; 3],
+        magnitude: [Lane<ISA>; C],
+        colour: [Lane<ISA>; C],
+    ) {
+        let zero = Lane::splat(0.0);
+        let mut constant = zero;
+        for ((remainder, observation), at) in
+            self.remainders.iter_mut().zip(&group.observations).zip(&group.illuminations)
+        {
+            let cosine = dot(normal, at.light).max(zero);
+            let (mut weight, mut projected, mut squares) = (zero, zero, zero);
+            for k in 0..C {
+                let left = observation.radiance[k] - magnitude[k] * cosine;
+                let coloured = observation.weight[k] * colour[k];
+                weight = coloured.mul_add(colour[k], weight);
+                projected = coloured.mul_add(left, projected);
+                squares = (observation.weight[k] * left).mul_add(left, squares);
+            }
+            let value = Lane::select(weight.positive(), projected / weight, zero);
+            constant = constant + squares - value * projected;
+            *remainder = Remainder { value, weight };
+        }
+        self.constant = constant.max(zero);
+        self.normal = normal;
+    }
+
+    #[inline(always)]
+    pub fn normal(&self, phi: Lane<ISA>) -> [Lane<ISA>; 3] {
+        let (sine, cosine) = sine_cosine(phi);
+        rotated(self.normal, sine, cosine)
+    }
+
+    /// Makes one lane that of a pixel of another group.
+    #[inline(always)]
+    fn copy_lane(&mut self, lane: usize, from: &Left<ISA>, pixel: usize) {
+        for (remainder, from) in self.remainders.iter_mut().zip(&from.remainders) {
+            remainder.value.0[lane] = from.value.0[pixel];
+            remainder.weight.0[lane] = from.weight.0[pixel];
+        }
+        self.constant.0[lane] = from.constant.0[pixel];
+        for (axis, from) in self.normal.iter_mut().zip(&from.normal) {
+            axis.0[lane] = from.0[pixel];
+        }
+    }
+}
+
+/// The fit of the shape: what it is for all pixels, under lights and a view that they share.
+#[derive(Clone, Copy)]
+pub struct ShapeFit<'a, M, const ISA: Isa> {
+    illuminations: &'a [Illumination<Lane<ISA>>],
     specular: Lane<ISA>,
     optics: Optics,
     /// θv and φv as calibrated.
@@ -58,73 +131,38 @@ fn rotated<R: Real>(normal: [R; 3], sine: R, cosine: R) -> [R; 3] {
 }
 
 impl<'a, M: Model, const ISA: Isa> ShapeFit<'a, M, ISA> {
-    /// `magnitude` is the diffuse stage's; the diffuse term keeps the normal of that stage.
     #[inline(always)]
-    pub fn new<const C: usize>(
-        group: &'a Group<ISA, C>,
-        normal: [Lane<ISA>; 3],
-        magnitude: [Lane<ISA>; C],
-        colour: [Lane<ISA>; C],
-        specular: Lane<ISA>,
-        optics: Optics,
-        remainders: &'a mut Vec<Remainder<ISA>>,
-    ) -> Self {
-        let zero = Lane::splat(0.0);
-        let mut constant = zero;
-        remainders.clear();
-        for (observation, at) in group.observations.iter().zip(&group.illuminations) {
-            let cosine = dot(normal, at.light).max(zero);
-            let (mut weight, mut projected, mut squares) = (zero, zero, zero);
-            for k in 0..C {
-                let left = observation.radiance[k] - magnitude[k] * cosine;
-                let coloured = observation.weight[k] * colour[k];
-                weight = coloured.mul_add(colour[k], weight);
-                projected = coloured.mul_add(left, projected);
-                squares = (observation.weight[k] * left).mul_add(left, squares);
-            }
-            let value = Lane::select(weight.positive(), projected / weight, zero);
-            constant = constant + squares - value * projected;
-            remainders.push(Remainder { value, weight });
-        }
-        let view = group.illuminations[0].view;
+    pub fn new(illuminations: &'a [Illumination<Lane<ISA>>], specular: Lane<ISA>, optics: Optics) -> Self {
+        let view = illuminations[0].view;
         let theta = Lane(array!(|i| view[0].0[i].atan2(view[2].0[i])));
         let phi = Lane(array!(|i| view[1].0[i].asin()));
-        ShapeFit {
-            illuminations: &group.illuminations,
-            remainders,
-            constant: constant.max(zero),
-            normal,
-            specular,
-            optics,
-            view: (theta, phi),
-            model: PhantomData,
-        }
-    }
-
-    #[inline(always)]
-    pub fn normal(&self, phi: Lane<ISA>) -> [Lane<ISA>; 3] {
-        let (sine, cosine) = sine_cosine(phi);
-        rotated(self.normal, sine, cosine)
+        ShapeFit { illuminations, specular, optics, view: (theta, phi), model: PhantomData }
     }
 
     /// The shape of the grid and the tilt out of the plane, of `tilts`, that fit best, seen from `view`.
     #[inline(always)]
-    fn search(&self, view: Option<[Lane<ISA>; 3]>, tilts: [Lane<ISA>; PHI_STARTS.len()]) -> (Lane<ISA>, Lane<ISA>) {
+    fn search(
+        &self,
+        left: &Left<ISA>,
+        view: Option<[Lane<ISA>; 3]>,
+        tilts: [Lane<ISA>; PHI_STARTS.len()],
+    ) -> (Lane<ISA>, Lane<ISA>) {
         outlined::<ISA, _>(
             #[inline(always)]
-            || self.search_inline(view, tilts),
+            || self.search_inline(left, view, tilts),
         )
     }
 
     #[inline(always)]
     fn search_inline(
         &self,
+        left: &Left<ISA>,
         view: Option<[Lane<ISA>; 3]>,
         tilts: [Lane<ISA>; PHI_STARTS.len()],
     ) -> (Lane<ISA>, Lane<ISA>) {
-        let normals: [_; PHI_STARTS.len()] = array!(|i| self.normal(tilts[i]));
+        let normals: [_; PHI_STARTS.len()] = array!(|i| left.normal(tilts[i]));
         let mut costs = [[Lane::splat(0.0); MAX_STARTS]; PHI_STARTS.len()];
-        for (remainder, calibrated) in self.remainders.iter().zip(self.illuminations) {
+        for (remainder, calibrated) in left.remainders.iter().zip(self.illuminations) {
             let mut at = *calibrated;
             if let Some(view) = view {
                 at = Illumination::new(at.light, view, self.optics.index);
@@ -152,27 +190,27 @@ impl<'a, M: Model, const ISA: Isa> ShapeFit<'a, M, ISA> {
 
     /// The best of a grid of shapes and φn, with θv as calibrated.
     #[inline(always)]
-    pub fn start(&self) -> Tilts<ISA> {
+    pub fn start(&self, left: &Left<ISA>) -> Tilts<ISA> {
         let (sine, cosine) = sine_cosine(self.view.0);
         let (shape_log, phi) =
-            self.search(Some([sine, Lane::splat(0.0), cosine]), array!(|i| Lane::splat(PHI_STARTS[i])));
+            self.search(left, Some([sine, Lane::splat(0.0), cosine]), array!(|i| Lane::splat(PHI_STARTS[i])));
         Tilts { view: self.view.0, shape_log, phi }
     }
 
     /// The same grid for the calibrated view. The highlight lies at φn = φv/2; its height does not tell on which side of it
     /// the normal is, so the search begins on the side of the painting's own normal.
     #[inline(always)]
-    pub fn start_out_of_plane(&self) -> Point<ISA> {
+    pub fn start_out_of_plane(&self, left: &Left<ISA>) -> Point<ISA> {
         let half = self.view.1 * Lane::splat(0.5);
         let away = Lane::select(half.lt(Lane::splat(0.0)), Lane::splat(1.0), Lane::splat(-1.0));
-        let (shape, phi) = self.search(None, array!(|i| half + away * Lane::splat(PHI_STARTS[i])));
+        let (shape, phi) = self.search(left, None, array!(|i| half + away * Lane::splat(PHI_STARTS[i])));
         let mut coordinates = [Lane::splat(0.0); MAX_SHAPE];
         coordinates[0] = shape;
-        Point { normal: normalise(self.normal(phi)), coordinates }
+        Point { normal: normalise(left.normal(phi)), coordinates }
     }
 
     #[inline(always)]
-    fn quadratic_inline(&self, point: &Tilts<ISA>) -> Quadratic<ISA, 3> {
+    fn quadratic(&self, left: &Left<ISA>, point: &Tilts<ISA>) -> Quadratic<ISA, 3> {
         // The directions carry the derivative by the view; they depend on nothing else.
         let (sine, cosine) = sine_cosine(point.view);
         let view: [Steered<_, 1>; 3] =
@@ -180,13 +218,13 @@ impl<'a, M: Model, const ISA: Isa> ShapeFit<'a, M, ISA> {
         let shape = point.shape_log.exp();
         let shape = Steered::<_, 3>::parameter(shape, 1, shape);
         let (sine, cosine) = sine_cosine(point.phi);
-        let normal = rotated(self.normal, sine, cosine);
-        let slope = rotated(self.normal, cosine, -sine);
+        let normal = rotated(left.normal, sine, cosine);
+        let slope = rotated(left.normal, cosine, -sine);
         let normal = array!(|i| Steered::parameter(normal[i], 2, slope[i]));
 
         let mut quadratic = Quadratic::zero();
-        quadratic.cost = self.constant;
-        for (remainder, calibrated) in self.remainders.iter().zip(self.illuminations) {
+        quadratic.cost = left.constant;
+        for (remainder, calibrated) in left.remainders.iter().zip(self.illuminations) {
             let light = array!(|i| Steered(Dual::constant(calibrated.light[i])));
             let at = Illumination::new(light, view, self.optics.index).map(
                 #[inline(always)]
@@ -235,27 +273,97 @@ fn sine_cosine<R: Real>(angle: R) -> (R, R) {
     (angle * sine, cosine)
 }
 
-impl<M: Model, const ISA: Isa> Objective<ISA, 3> for ShapeFit<'_, M, ISA> {
+/// A group of pixels whose shapes are to be fitted, and what came of it.
+pub struct Waiting<const ISA: Isa> {
+    pub left: Left<ISA>,
+    pub wanted: LaneMask,
+    /// Where the fits begin, then where they ended.
+    pub point: Tilts<ISA>,
+    pub cost: Lane<ISA>,
+    pub converged: LaneMask,
+}
+
+impl<const ISA: Isa> Waiting<ISA> {
+    pub fn new(lights: usize) -> Self {
+        let zero = Lane::splat(0.0);
+        Waiting {
+            left: Left::new(lights),
+            wanted: LaneMask::NONE,
+            point: Tilts { view: zero, shape_log: zero, phi: zero },
+            cost: zero,
+            converged: LaneMask::NONE,
+        }
+    }
+}
+
+/// The pixels of several groups, fitted side by side, each lane with the next when it has done with one.
+pub struct ShapeQueue<'a, M, const ISA: Isa> {
+    fit: ShapeFit<'a, M, ISA>,
+    waiting: &'a mut [Waiting<ISA>],
+    /// The next pixel, counted over the groups.
+    next: usize,
+    /// The pixels that the lanes are at.
+    pixels: [usize; LANES],
+    lanes: &'a mut Left<ISA>,
+}
+
+impl<'a, M: Model, const ISA: Isa> ShapeQueue<'a, M, ISA> {
+    /// Fits the wanted pixels of all groups; `lanes` is a buffer.
+    #[inline(always)]
+    pub fn run(fit: ShapeFit<'a, M, ISA>, waiting: &'a mut [Waiting<ISA>], lanes: &'a mut Left<ISA>, max_steps: usize) {
+        let anywhere = waiting[0].point;
+        let mut queue = ShapeQueue { fit, waiting, next: 0, pixels: [0; LANES], lanes };
+        minimise_all(&mut queue, &anywhere, max_steps);
+    }
+}
+
+impl<M: Model, const ISA: Isa> Queue<ISA, 3> for ShapeQueue<'_, M, ISA> {
+    #[inline(always)]
+    fn next(&mut self, lane: usize, point: &mut Tilts<ISA>) -> bool {
+        while let Some(group) = self.waiting.get(self.next / LANES) {
+            let pixel = self.next % LANES;
+            self.next += 1;
+            if group.wanted.holds(pixel) {
+                self.lanes.copy_lane(lane, &group.left, pixel);
+                point.copy_lane(lane, &group.point, pixel);
+                self.pixels[lane] = self.next - 1;
+                return true;
+            }
+        }
+        false
+    }
+
+    #[inline(always)]
+    fn finish(&mut self, lane: usize, outcome: &Outcome<Tilts<ISA>, ISA>) {
+        let group = &mut self.waiting[self.pixels[lane] / LANES];
+        let pixel = self.pixels[lane] % LANES;
+        group.point.copy_lane(pixel, &outcome.point, lane);
+        group.cost.0[pixel] = outcome.cost.0[lane];
+        group.converged.set(pixel, outcome.converged.holds(lane));
+    }
+}
+
+impl<M: Model, const ISA: Isa> Objective<ISA, 3> for ShapeQueue<'_, M, ISA> {
     type Point = Tilts<ISA>;
 
     #[inline(always)]
     fn quadratic(&mut self, point: &Tilts<ISA>) -> Quadratic<ISA, 3> {
         outlined::<ISA, _>(
             #[inline(always)]
-            || self.quadratic_inline(point),
+            || self.fit.quadratic(self.lanes, point),
         )
     }
 
     #[inline(always)]
     fn moved(&self, point: &Tilts<ISA>, step: &[Lane<ISA>; 3]) -> Tilts<ISA> {
-        let (lower, upper) = Self::shape_bounds();
+        let (lower, upper) = ShapeFit::<M, ISA>::shape_bounds();
         let (turn, stretch) = (Lane::splat(0.1), Lane::splat(1.2));
         let range = Lane::splat(VIEW_RANGE);
         let view = point.view + step[0].min(turn).max(-turn);
         let shape_log = point.shape_log + step[1].min(stretch).max(-stretch);
         let phi = point.phi + step[2].min(turn).max(-turn);
         Tilts {
-            view: view.max(self.view.0 - range).min(self.view.0 + range),
+            view: view.max(self.fit.view.0 - range).min(self.fit.view.0 + range),
             shape_log: shape_log.max(lower).min(upper),
             phi: phi.max(Lane::splat(0.0)).min(Lane::splat(PHI_MAX)),
         }
@@ -264,10 +372,10 @@ impl<M: Model, const ISA: Isa> Objective<ISA, 3> for ShapeFit<'_, M, ISA> {
     #[inline(always)]
     fn blocked(&self, point: &Tilts<ISA>, descent: &[Lane<ISA>; 3]) -> [LaneMask; 3] {
         let zero = Lane::splat(0.0);
-        let (lower, upper) = Self::shape_bounds();
+        let (lower, upper) = ShapeFit::<M, ISA>::shape_bounds();
         let range = Lane::splat(VIEW_RANGE);
         let bounds = [
-            (point.view, self.view.0 - range, self.view.0 + range),
+            (point.view, self.fit.view.0 - range, self.fit.view.0 + range),
             (point.shape_log, lower, upper),
             (point.phi, zero, Lane::splat(PHI_MAX)),
         ];

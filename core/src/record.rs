@@ -1,5 +1,7 @@
 //! The row of numbers that a fit writes for each pixel.
 
+use crate::lanes::LANES;
+
 /// Why a pixel's parameters are what they are. The order is the code in the status map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(u8)]
@@ -73,11 +75,23 @@ impl Layout {
     }
 }
 
-/// A fit of eight pixels at a time.
-pub trait FitGroup {
+/// A fit of some pixels, sixteen at a time.
+pub trait FitBlock {
     fn layout(&self) -> Layout;
-    /// Fits the eight pixels from `first` on and writes those that the tile has: `status` says how many.
-    fn fit_group(&mut self, first: usize, rows: &mut [f32], status: &mut [u8]);
+    /// Fits the pixels from `first` on, of which the tile has as many as `status` says, and writes them.
+    fn fit_block(&mut self, first: usize, rows: &mut [f32], status: &mut [u8]);
+}
+
+/// The groups of a block: the first pixel of each, and where its rows and status go.
+#[inline(always)]
+pub fn groups<'a>(
+    first: usize,
+    width: usize,
+    rows: &'a mut [f32],
+    status: &'a mut [u8],
+) -> impl Iterator<Item = (usize, &'a mut [f32], &'a mut [u8])> {
+    let groups = rows.chunks_mut(LANES * width).zip(status.chunks_mut(LANES));
+    groups.enumerate().map(move |(group, (rows, status))| (first + group * LANES, rows, status))
 }
 
 /// Appends quantities to a pixel's row in the order of its layout.
