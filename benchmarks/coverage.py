@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from itertools import product
 from pathlib import Path
@@ -28,6 +28,8 @@ LEVEL = 0.95
 CONDITIONS = (3, 5, 7)
 OBSERVERS = (18, 54)
 DIFFERENCES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5)
+TIES_DIFFERENCES = (0.0, 0.5, 1.0, 1.5)
+TIES_THRESHOLDS = (0.2, 0.6)
 MONTAG_DIFFERENCES = (0.0, 0.5, 1.0, 1.5, 2.0)
 EXPERIMENTS = 2000
 DRAWS = 200
@@ -104,6 +106,32 @@ def cover(
     }
 
 
+def cover_ties(
+    scale: np.ndarray, observers: int, experiments: int, seed: int, *, threshold: float, draws: int = DRAWS
+) -> tuple[Coverage, float]:
+    """Return the coverage by the method "observers" where answers may be ties, and the share of ties."""
+    random = np.random.default_rng(seed)
+    conditions = len(scale)
+    design, first, second = pair_design(conditions)
+    truth = design @ scale
+    values, nothing = scale - scale.mean(), np.zeros((conditions, conditions))
+    names = tuple(map(str, range(conditions))), tuple(map(str, range(observers)))
+    inside, tied = np.empty((experiments, conditions + len(truth)), dtype=bool), 0.0
+    for number in range(experiments):
+        seen = truth + random.normal(size=(observers, len(truth)))
+        wins, ties = np.zeros((2, observers, conditions, conditions))
+        wins[:, first, second], wins[:, second, first] = seen > threshold, seen < -threshold
+        ties[:, first, second] = ties[:, second, first] = np.abs(seen) <= threshold
+        found = limits(
+            Comparisons(*names, wins, ties, nothing, nothing), level=LEVEL, draws=draws, seed=number
+        )
+        low = np.r_[found.low, found.difference_low[first, second]]
+        high = np.r_[found.high, found.difference_high[first, second]]
+        inside[number] = (low <= np.r_[values, truth]) & (np.r_[values, truth] <= high)
+        tied += float(np.mean(np.abs(seen) <= threshold))
+    return _summary(inside, conditions), tied / experiments
+
+
 def cover_montag(scale: np.ndarray, observers: int, experiments: int, seed: int) -> tuple[Coverage, float]:
     """Return the coverage of Montag's formula, and the share of experiments that object to it."""
     chosen = simulate(scale, observers, experiments, seed).sum(axis=1)
@@ -142,43 +170,82 @@ def _summary(inside: np.ndarray, conditions: int) -> Coverage:
     return Coverage(float(share[:conditions].mean()), float(share[conditions:].mean()), float(share.min()))
 
 
-def study(experiments: int) -> dict[str, list[dict]]:
-    """Return all situations, with the coverage in each."""
-    found: dict[str, list[dict]] = {"neighbours": [], "ends": [], "montag": [], "pooled": [], "exact": []}
-    for design, conditions, observers in product(("neighbours", "ends"), CONDITIONS, OBSERVERS):
+def study(design: str, experiments: int) -> list[dict]:
+    """Return all situations of a part of the study, with the coverage in each."""
+    found = []
+    for conditions, observers in product(CONDITIONS, OBSERVERS):
         for number, difference in enumerate(DIFFERENCES):
             scale = equally_spaced(conditions, difference, ends=design == "ends")
             methods = cover(scale, observers, experiments, 100 * conditions + number)
-            found[design].append({"n": conditions, "N": observers, "z": difference, **_data(methods)})
+            found.append({"n": conditions, "N": observers, "z": difference, **_data(methods)})
+    return found
+
+
+def study_ties(experiments: int) -> list[dict]:
+    """Return the coverage where answers may be ties."""
+    found = []
+    for conditions, observers, threshold in product((3, 5), OBSERVERS, TIES_THRESHOLDS):
+        for difference in TIES_DIFFERENCES:
+            scale = equally_spaced(conditions, difference, ends=False)
+            ties, share = cover_ties(scale, observers, experiments // 2, 11, threshold=threshold)
+            row = {"n": conditions, "N": observers, "threshold": threshold, "z": difference, "share": share}
+            found.append(row | _data({"observers": ties}))
+    return found
+
+
+def study_montag(experiments: int) -> list[dict]:
+    """Return the coverage of Montag's formula."""
+    found = []
     for conditions, observers, difference in product((2, 3, 4, 5, 7), OBSERVERS, MONTAG_DIFFERENCES):
         scale = equally_spaced(conditions, difference, ends=False)
         montag, noted = cover_montag(scale, observers, max(experiments // 4, 100), 7)
         row = {"n": conditions, "N": observers, "z": difference, "noted": noted}
-        found["montag"].append(row | _data({"montag": montag}))
+        found.append(row | _data({"montag": montag}))
+    return found
+
+
+def study_pooled(experiments: int) -> list[dict]:
+    """Return the coverage where each observer answers seven times."""
+    found = []
     for conditions, observers, variety in product((2, 3), OBSERVERS, (0.0, 0.3, 0.6)):
         for difference in (0.0, 0.75, 1.5):
             scale = equally_spaced(conditions, difference, ends=False)
             methods = cover(scale, observers, experiments // 2, 9, answers=7, variety=variety)
             row = {"n": conditions, "N": observers, "variety": variety, "z": difference}
-            found["pooled"].append(row | _data(methods))
+            found.append(row | _data(methods))
+    return found
+
+
+def study_exact() -> list[dict]:
+    """Return the coverage of the exact limits."""
+    found = []
     for observers in OBSERVERS:
         covered = cover_exact(observers, np.arange(0, 1.501, 0.01))
-        shares = {"least": covered.min(), "mean": covered.mean(), "most": covered.max()}
-        found["exact"].append({"N": observers, **shares})
+        found.append({"N": observers, "least": covered.min(), "mean": covered.mean(), "most": covered.max()})
     return found
+
+
+PARTS: dict[str, Callable[[int], list[dict]]] = {
+    "neighbours": lambda experiments: study("neighbours", experiments),
+    "ends": lambda experiments: study("ends", experiments),
+    "ties": study_ties,
+    "montag": study_montag,
+    "pooled": study_pooled,
+    "exact": lambda _: study_exact(),
+}
 
 
 def _data(methods: dict[str, Coverage]) -> dict[str, dict[str, float]]:
     return {method: asdict(coverage) for method, coverage in methods.items()}
 
 
-def tables(found: dict[str, list[dict]], experiments: int, seconds: float) -> str:
+def tables(found: dict[str, list[dict]], experiments: int) -> str:
     """Return the results as Markdown."""
     error = 100 * np.sqrt(LEVEL * (1 - LEVEL) / experiments)
     lines = [
         "# Coverage of the limits",
         "",
-        f"Measured by `python -m benchmarks.coverage` in {seconds / 60:.0f} minutes: how often limits at "
+        "Measured by `python -m benchmarks.coverage`: how often limits at "
         f"95 % cover the truth, in per cent. {experiments} simulated experiments for each column of the "
         f"first tables, {DRAWS} draws of the observers in each; the coverage of one value is known to "
         f"±{error:.1f} (standard error), means are known better. n: stimuli, equally spaced; N: observers, "
@@ -198,6 +265,25 @@ def tables(found: dict[str, list[dict]], experiments: int, seconds: float) -> st
         f"{_percent(row['observers']['differences'])} | {_percent(row['independent']['differences'])} |"
         for row in found["pooled"]
     ]
+    lines += ["", "## Answers that may be ties, neighbours at a distance of", ""]
+    lines += [
+        "Differences, and in brackets the least of any value or difference; half as many experiments. "
+        "*threshold* is Glenn and David's, *ties* the share of the answers that are ties, at the least and "
+        "the largest distance.",
+        "",
+    ]
+    header = " | ".join(f"{difference:g} z" for difference in TIES_DIFFERENCES)
+    lines += [f"| n | N | threshold | ties | {header} |", "|" + "---|" * (len(TIES_DIFFERENCES) + 4)]
+    for start in range(0, len(found["ties"]), len(TIES_DIFFERENCES)):
+        rows = found["ties"][start : start + len(TIES_DIFFERENCES)]
+        cells = [
+            f"{_percent(row['observers']['differences'])} ({_percent(row['observers']['least'])})"
+            for row in rows
+        ]
+        lines.append(
+            f"| {rows[0]['n']} | {rows[0]['N']} | {rows[0]['threshold']:g} z | "
+            f"{100 * rows[0]['share']:.0f} – {100 * rows[-1]['share']:.0f} % | {' | '.join(cells)} |"
+        )
     lines += ["", "## Montag's formula, neighbours at a distance of", ""]
     lines += [
         "Scale values; in brackets the share of experiments in which the output objects to the formula.",
@@ -242,12 +328,12 @@ def _percent(share: float) -> str:
 def missed(found: dict[str, list[dict]]) -> list[str]:
     """Return the figures that miss their bar: 93 % everywhere, 93 to 97 % on average."""
     bad = []
-    for design in ("neighbours", "ends"):
-        for (conditions, observers), rows in _grouped(found[design]):
+    for part in ("neighbours", "ends", "ties"):
+        for (conditions, observers), rows in _grouped(found[part]):
             for what in ("values", "differences"):
                 shares = [row["observers"][what] for row in rows]
                 if min(shares) < 0.93 or not 0.93 <= np.mean(shares) <= 0.97:
-                    bad.append(f"{design} n={conditions} N={observers} {what}: {np.round(shares, 3)}")
+                    bad.append(f"{part} n={conditions} N={observers} {what}: {np.round(shares, 3)}")
     return bad
 
 
@@ -255,18 +341,19 @@ def main() -> int:
     """Run the study and return how many figures miss their bar."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.coverage", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="a twentieth of the experiments; writes nothing")
-    quick = parser.parse_args().quick
-    experiments = EXPERIMENTS // 20 if quick else EXPERIMENTS
-    started = time.perf_counter()
-    found = study(experiments)
-    text = tables(found, experiments, time.perf_counter() - started)
+    parser.add_argument("--part", action="append", choices=PARTS, help="keep what was found for the others")
+    arguments = parser.parse_args()
+    file = Path(__file__).with_name("coverage.json")
+    experiments = EXPERIMENTS // 20 if arguments.quick else EXPERIMENTS
+    found = json.loads(file.read_text(encoding="utf-8")) if arguments.part else {}
+    found |= {part: PARTS[part](experiments) for part in arguments.part or PARTS}
+    text = tables(found, experiments)
     print(text)
     bad = missed(found)
     print("\n".join(bad) or "all bars are met")
-    if not quick:
-        folder = Path(__file__).parent
-        (folder / "coverage.md").write_text(text, encoding="utf-8")
-        (folder / "coverage.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    if not arguments.quick:
+        file.with_suffix(".md").write_text(text, encoding="utf-8")
+        file.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     return len(bad)
 
 

@@ -159,23 +159,31 @@ def test_few_observers_are_noted():
     assert "too few" in " ".join(limits(drawn([0, 0.3, 0.6], 4)).notes)
 
 
-def test_limits_with_ties_cover():
+@pytest.mark.parametrize(("threshold", "difference"), [(0.2, 1.0), (0.6, 0.5)])
+def test_limits_with_ties_cover(threshold, difference):
     """Glenn and David's answers, scaled with their threshold."""
-    random = np.random.default_rng(2)
-    scale = np.array([0.0, 0.5, 1.0])
-    _, first, second = pair_design(3)
-    inside = []
-    for _ in range(80):
-        seen = scale[first] - scale[second] + random.normal(size=(18, 3))
-        wins, ties = np.zeros((2, 18, 3, 3))
-        wins[:, first, second], wins[:, second, first] = seen > 0.4, seen < -0.4
-        ties[:, first, second] = ties[:, second, first] = np.abs(seen) <= 0.4
-        found = limits(comparisons(wins, ties), draws=100)
-        truth = scale[first] - scale[second]
-        inside.append(
-            (found.difference_low[first, second] <= truth) & (truth <= found.difference_high[first, second])
-        )
-    assert 0.9 < np.mean(inside) <= 1
+    scale = coverage.equally_spaced(3, difference, ends=False)
+    found, share = coverage.cover_ties(scale, 18, 120, 2, threshold=threshold, draws=100)
+    assert 0.93 < found.values <= 1
+    assert 0.93 < found.differences <= 1
+    assert share > 0.05
+
+
+def test_a_draw_without_ties_is_scaled_too():
+    # A tie by two of 18 observers: one draw in eight has none of them.
+    wins, ties = np.zeros((2, 18, 2, 2))
+    wins[:10, 0, 1] = wins[10:16, 1, 0] = ties[16:, 0, 1] = ties[16:, 1, 0] = 1
+    found = limits(comparisons(wins, ties), method="observers", draws=400)
+    assert not any("gave no scale" in note for note in found.notes)
+
+
+def test_exact_limits_leave_ties_out_and_say_so():
+    wins, ties = np.zeros((2, 20, 2, 2))
+    wins[:10, 0, 1] = wins[10:15, 1, 0] = ties[15:, 0, 1] = ties[15:, 1, 0] = 1
+    found, without = limits(comparisons(wins, ties)), limits(of_two(10, 5))
+    assert found.method == "exact"
+    assert (found.p_value, *found.low, *found.high) == (without.p_value, *without.low, *without.high)
+    assert "5 ties were left out" in found.notes
 
 
 def test_unknown_methods_are_refused():
@@ -189,6 +197,7 @@ def test_the_results_that_the_documentation_states_meet_their_bars():
     found = json.loads(Path(coverage.__file__).with_name("coverage.json").read_text(encoding="utf-8"))
     assert coverage.missed(found) == []
     assert len(found["neighbours"]) == len(found["ends"]) == 3 * 2 * 7
+    assert len(found["ties"]) == 2 * 2 * 2 * 4
     worst = json.loads(json.dumps(found["neighbours"]))
     worst[0]["observers"]["values"] = 0.92
-    assert len(coverage.missed({"neighbours": worst, "ends": found["ends"]})) == 1
+    assert len(coverage.missed({**found, "neighbours": worst})) == 1

@@ -219,12 +219,12 @@ def scale_comparisons(name: str, by: str, comparisons: Comparisons, options: Sca
     notes = [*_notes_of_fit(names, fit), *_notes_of_counts(names, counts, closed)]
     estimate = fit.scale
     errors = fit.standard_errors()
-    if fit.status == "unbounded":
+    if fit.status == "unbounded" and not fit.tells_nothing:
         reduced = fit_likelihood(comparisons, link=options.link, reduce_bias=True)
         estimate, errors = reduced.scale, reduced.standard_errors()
     if options.model == "closed-form":
         estimate = closed.scale
-    if fit.status == "disconnected":
+    if fit.tells_nothing:
         nothing = np.full(len(names), np.nan)
         unknown = np.full((len(names), len(names)), np.nan)
         found = Limits("none", options.level, nothing, nothing, unknown, unknown)
@@ -280,6 +280,8 @@ def _notes_of_fit(names: Sequence[str], fit: Fit) -> list[str]:
     parts = "; ".join(", ".join(names[i] for i in part) for part in fit.parts)
     if fit.status == "disconnected":
         return [f"no comparisons connect these conditions, so that there is no common scale: {parts}"]
+    if fit.tells_nothing:
+        return [f"all answers are ties, and nothing tells these conditions apart: {parts}"]
     if fit.status == "unbounded":
         return [
             f"all answers between these went one way, and the likelihood has no finite maximum: {parts}. "

@@ -35,9 +35,10 @@ class Fit:
         Of the scale of mean 0, from the expected information.
     status : {"converged", "unbounded", "disconnected", "not converged"}
         "unbounded": all choices between two sets of conditions went one way, and the likelihood grows with
-        their distance.
+        their distance; or all answers are ties, and it grows with their threshold.
     parts : tuple of tuple of int
-        The sets between which nothing is known (disconnected) or no distance is finite (unbounded).
+        The sets between which nothing is known (disconnected) or no distance is finite (unbounded); a single
+        one where all answers are ties.
     deviance : float
         G² against the proportions themselves.
     degrees_of_freedom : int
@@ -56,6 +57,11 @@ class Fit:
     p_value: float
     position: float = float("nan")
     position_error: float = float("nan")
+
+    @property
+    def tells_nothing(self) -> bool:
+        """Whether the answers leave the scale wholly open, also with the bias removed."""
+        return self.status == "disconnected" or (self.status == "unbounded" and len(self.parts) == 1)
 
     def standard_errors(self, reference: int | None = None) -> NDArray[np.float64]:
         """Return the standard errors of the scale of mean 0, or of the differences to one condition.

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, xlogy
 from scipy.stats import chi2
 
-from impasto.psychophysics.scaling.batch import BatchFit, hazards, inverses
+from impasto.psychophysics.scaling.batch import BatchFit, fit_batch, hazards, inverses
 from impasto.psychophysics.scaling.comparisons import Comparisons
 from impasto.psychophysics.scaling.likelihood import Fit, existence, pair_design
 
@@ -62,6 +62,8 @@ def fit_ties(comparisons: Comparisons) -> TiesFit:
     compared = chosen + refused + tied > 0
     design, chosen, refused, tied = design[compared], chosen[compared], refused[compared], tied[compared]
     status, parts = existence(comparisons.counts)
+    if status == "converged" and not (chosen + refused).any():
+        status = "unbounded"
     degrees = 2 * len(chosen) - conditions
     if status != "converged":
         nothing = np.full(conditions, np.nan)
@@ -125,10 +127,14 @@ def fit_ties_batch(
     Returns
     -------
     BatchFit
-        The threshold is the last parameter.
+        The threshold is the last parameter; 0 for a table without ties, whose fit is that of the model
+        without them.
     """
     batch, cells = chosen.shape
     size = conditions + 1
+    some = np.asarray(tied.any(axis=1))
+    if not some.all():
+        return _with_tieless(design, chosen, refused, tied, some, conditions, reduce_bias, start, tolerance)
     # The predictors of "more than the threshold" and of "more than minus the threshold".
     upper = np.c_[design, -np.ones(cells)]
     lower = np.c_[design, np.ones(cells)]
@@ -168,8 +174,10 @@ def fit_ties_batch(
             gradient[:, :conditions] -= (0.5 * leverage * 0.5 * (over + under)) @ design
         step = np.einsum("bpq,bq->bp", inverse, gradient)
         longest = np.abs(step).max(axis=1, keepdims=True)
+        # Where there are ties the threshold is above 0, and no step may reach that.
+        least = 0.5 * parameters[:, -1]
         parameters += step * np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, _SMALLEST))
-        parameters[:, -1] = np.maximum(parameters[:, -1], 1e-9)
+        parameters[:, -1] = np.maximum(parameters[:, -1], least)
         covariance = inverse
         converged = longest[:, 0] < tolerance
         if converged.all():
@@ -177,3 +185,46 @@ def fit_ties_batch(
     shift = np.zeros((size, size))
     shift[:conditions, :conditions] = 1.0 / conditions**2
     return BatchFit(parameters, covariance - shift, converged)
+
+
+def _with_tieless(
+    design: NDArray[np.float64],
+    chosen: NDArray[np.float64],
+    refused: NDArray[np.float64],
+    tied: NDArray[np.float64],
+    some: NDArray[np.bool_],
+    conditions: int,
+    reduce_bias: bool,
+    start: NDArray[np.float64] | None,
+    tolerance: float,
+) -> BatchFit:
+    """Fit tables of which only `some` (B,) have ties: at a threshold of 0 Newton's steps would not end."""
+    batch, size = len(chosen), conditions + 1
+    found = BatchFit(np.zeros((batch, size)), np.zeros((batch, size, size)), np.zeros(batch, dtype=bool))
+    without = fit_batch(
+        design,
+        chosen[~some],
+        refused[~some],
+        conditions=conditions,
+        reduce_bias=reduce_bias,
+        start=None if start is None else start[~some, :conditions],
+        tolerance=tolerance,
+    )
+    found.parameters[~some, :conditions] = without.parameters
+    found.covariance[~some, :conditions, :conditions] = without.covariance
+    found.converged[~some] = without.converged
+    if some.any():
+        fitted = fit_ties_batch(
+            design,
+            chosen[some],
+            refused[some],
+            tied[some],
+            conditions=conditions,
+            reduce_bias=reduce_bias,
+            start=None if start is None else start[some],
+            tolerance=tolerance,
+        )
+        found.parameters[some] = fitted.parameters
+        found.covariance[some] = fitted.covariance
+        found.converged[some] = fitted.converged
+    return found
