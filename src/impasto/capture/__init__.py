@@ -51,6 +51,8 @@ class Capture:
         infinite where none is.
     noise : dict of str to float
         Overrides of the noise model's ``read``, ``photon`` and ``relative``; empty where none is given.
+    brackets : tuple of Path
+        Folders with further exposures of the same names that the light file knows of.
     """
 
     photographs: tuple[Photograph, ...]
@@ -60,6 +62,7 @@ class Capture:
     notes: tuple[str, ...]
     clip_level: float
     noise: dict[str, float]
+    brackets: tuple[Path, ...] = ()
 
 
 def read_capture(
@@ -141,6 +144,7 @@ def read_capture(
         notes=(*notes, *header_notes, *exposure_notes),
         clip_level=default_clip if light_file.clip_level is None else light_file.clip_level,
         noise=light_file.noise,
+        brackets=tuple(light_file.path.parent / name for name in light_file.brackets),
     )
 
 

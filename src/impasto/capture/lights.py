@@ -72,6 +72,8 @@ class LightFile:
         Value, as stored in the photographs, from which on a sample is clipped.
     noise : dict of str to float
         Overrides of ``read``, ``photon`` and ``relative``.
+    brackets : tuple of str
+        Folders with further exposures of the same names, relative to that of the file.
     """
 
     path: Path
@@ -82,6 +84,7 @@ class LightFile:
     transfer: str | None = None
     clip_level: float | None = None
     noise: dict[str, float] = field(default_factory=dict)
+    brackets: tuple[str, ...] = ()
 
 
 def parse_number(text: str) -> float:

@@ -116,7 +116,8 @@ def stack(
     exclude : iterable of str, optional
         Names of photographs to leave out.
     brackets : iterable of path, optional
-        Folders with further exposures of the same names, which are merged with those in `photos`.
+        Folders with further exposures of the same names, which are merged with those in `photos`; by default
+        those that the light file names.
     oecf, dark, flat, white, colour : path, optional
         Calibration files, as `impasto.calibrate` makes them.
     half_size : bool, optional
@@ -144,7 +145,7 @@ def stack(
     capture = _read(Path(photos), path, lights, exclude, half_size)
     named = {"oecf": oecf, "dark": dark, "flat": flat, "white": white, "colour": colour}
     corrections = read_corrections(named, capture)
-    exposures = read_brackets(capture, brackets)
+    exposures = read_brackets(capture, list(brackets) or capture.brackets)
     job = _Job(capture, corrections, exposures, memory_bytes, show_progress)
     with stores.run(path, "stack") as log:
         fresh, already = _compare(path, job, overwrite)
