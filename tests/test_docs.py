@@ -48,6 +48,7 @@ def public(kind):
 
 def test_commands_stand_in_the_order_of_the_pipeline():
     assert PROGRAM.list_commands(None) == [
+        "capture",
         "simulate",
         "calibrate",
         "stack",
@@ -78,8 +79,9 @@ def test_each_command_is_explained(name):
     assert re.match(rf"Example: impasto {name}\b", command.epilog)
     assert all(parameter.help for parameter in command.params)
     assert any(f"impasto {name}" in page.read_text(encoding="utf-8") for page in PAGES)
-    # `impasto calibrate lights` is impasto.calibrate.lights in Python.
-    assert callable(operator.attrgetter(name.replace(" ", "."))(impasto)) or name == "models"
+    # `impasto calibrate lights` is impasto.calibrate.lights in Python; impasto.capture reads what was captured.
+    path = name.replace("capture ", "stand ").replace(" ", ".")
+    assert callable(operator.attrgetter(path)(impasto)) or name == "models"
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from impasto.lazy import make_lazy
 
 if TYPE_CHECKING:
-    from impasto import calibrate, models
+    from impasto import calibrate, models, stand
     from impasto.angles import angles
     from impasto.capture.simulate import simulate
     from impasto.demo import demo
@@ -62,6 +62,7 @@ __all__ = [
     "scale",
     "simulate",
     "stack",
+    "stand",
     "view",
 ]
 
@@ -91,6 +92,7 @@ _HOME = {
     "scale": "psychophysics.scaling.scale",
     "simulate": "capture.simulate",
     "stack": "stack",
+    "stand": "stand",
     "view": "view",
 }
 

@@ -90,17 +90,18 @@ def steadiness(
             Problem(str(photos), "holds fewer than three photographs", "Give the whole series")
         )
     first = read_shot(paths[0])
-    edges: list[list[NDArray[np.float64]]] = []
+    seen: list[list[NDArray[np.float64]]] = []
     made_from = []
     for path in paths:
         shot = first if path == paths[0] else read_shot(path)
         if shot.codes.shape != first.codes.shape:
             raise CaptureError(Problem(path.name, f"has another size than {paths[0].name}", "Leave it out"))
-        edges.append([_edges(part) for part in _parts(shot.linear().mean(axis=2))])
+        luminance = shot.linear().mean(axis=2)
+        seen.append([edges(log_level(luminance[part])) for part in part_slices(*luminance.shape)])
         made_from.append(shot.provenance)
-    mean = [np.mean([one[part] for one in edges], axis=0) for part in range(len(edges[0]))]
+    mean = [np.mean([one[part] for one in seen], axis=0) for part in range(len(seen[0]))]
     shifts = []
-    for one in edges:
+    for one in seen:
         found = [
             phase_cross_correlation(reference, part, upsample_factor=_FINENESS, normalization=None)[0]
             for reference, part in zip(mean, one, strict=True)
@@ -126,21 +127,25 @@ def steadiness(
     return Steadiness(Path(out), names, shift, moved, bumped)
 
 
-def _parts(image: NDArray[np.floating]) -> list[NDArray[np.floating]]:
-    height, width = image.shape
+def part_slices(height: int, width: int) -> list[tuple[slice, slice]]:
+    """Return the rows and columns of the parts of a frame that are compared: all of it if it is small."""
     if min(height, width) <= _WINDOW_PX:
-        return [image]
+        return [(slice(0, height), slice(0, width))]
     parts = []
     for down, across in _WINDOWS:
         top = int(np.clip(down * height - _WINDOW_PX / 2, 0, height - _WINDOW_PX))
         left = int(np.clip(across * width - _WINDOW_PX / 2, 0, width - _WINDOW_PX))
-        parts.append(image[top : top + _WINDOW_PX, left : left + _WINDOW_PX])
+        parts.append((slice(top, top + _WINDOW_PX), slice(left, left + _WINDOW_PX)))
     return parts
 
 
-def _edges(image: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Return the edges of an image, whatever its brightness, fading out towards its border."""
-    level = np.log(np.maximum(image, 0) + 0.05 * float(image.mean()) + 1e-9)
+def log_level(image: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return the logarithm of a luminance, in which light and dark parts have like edges."""
+    return np.asarray(np.log(np.maximum(image, 0) + 0.05 * float(image.mean()) + 1e-9))
+
+
+def edges(level: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return the edges of a logarithm of luminance, fading out towards the image's border."""
     edges = gaussian_gradient_magnitude(level.astype(np.float64), 1.0)
     edges -= edges.mean()
     taper = np.outer(np.hanning(edges.shape[0]), np.hanning(edges.shape[1]))

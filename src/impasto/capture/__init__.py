@@ -28,7 +28,7 @@ __all__ = ["Capture", "Photograph", "read_capture"]
 
 # Stored value from which on a sample is clipped. JPEG's ringing lets clipped areas read 254; the top per cent
 # of 16 bits leaves room for a raw converter's rounding and white balance; floats say nothing about clipping.
-_CLIP_LEVEL = {"uint8": 254.0, "uint16": 0.99 * 65535, "float32": np.inf}
+CLIP_LEVEL = {"uint8": 254.0, "uint16": 0.99 * 65535, "float32": np.inf}
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ def read_capture(
     camera = light_file.camera
     if half_size:
         ordered, camera = _halved(ordered, camera)
-    default_clip = _CLIP_LEVEL[ordered[0].dtype.name]
+    default_clip = CLIP_LEVEL[ordered[0].dtype.name]
     return Capture(
         photographs=ordered,
         lights=make_lights(rows, [photograph.name for photograph in ordered], exposure),

@@ -16,7 +16,7 @@ def manifest(
     camera: Camera,
     photographs: Iterable[str] = (),
     *,
-    exposure_s: float | None = None,
+    exposure_s: float | Sequence[float] | None = None,
 ) -> str:
     """Return the TOML manifest of a folder of photographs.
 
@@ -29,8 +29,8 @@ def manifest(
     camera : Camera
     photographs : iterable of str, optional
         Lines of the table ``[photographs]``.
-    exposure_s : float, optional
-        The photographs' exposure time.
+    exposure_s : float or sequence of float, optional
+        The photographs' exposure time, or that of each.
     """
     lines = ["[camera]", f"view = {toml_list(camera.view_direction)}"]
     if camera.distance_mm is not None:
@@ -50,7 +50,8 @@ def manifest(
         if np.isfinite(lights.angular_size_deg[row]):
             lines.append(f"angular_size_deg = {toml_number(lights.angular_size_deg[row])}")
         if exposure_s is not None:
-            lines.append(f"exposure_s = {toml_number(exposure_s)}")
+            time = exposure_s if isinstance(exposure_s, int | float) else exposure_s[row]
+            lines.append(f"exposure_s = {toml_number(time)}")
     return "\n".join(lines) + "\n"
 
 

@@ -10,6 +10,7 @@ from impasto.cli.app import app
 
 # In the order in which the help lists them.
 COMMANDS = (
+    "capture",
     "simulate",
     "calibrate",
     "stack",

@@ -79,19 +79,23 @@ def _shots(studio: Studio) -> Iterator[tuple[str, Callable[[], Array], float]]:
     """Yield each shot's name, the function that gives its radiance, and its exposure in stops."""
     size, frontal = studio.size, studio.frontal
     yield "dark", lambda: np.zeros((*size, 3)), 0
-    yield "white_card", partial(_card, studio, frontal), 0
+    yield "white_card", partial(card_radiance, studio, frontal), 0
     # A chart is exposed so that its white just does not clip.
     full = np.log2(_WHITE_OF_CHART / (studio.sensor.exposure * studio.lights.intensity[frontal].max()))
-    yield "grey_scale", lambda: charts.grey_scale().image(size) * _card(studio, frontal), full
-    yield "grey_scale_card", partial(_card, studio, frontal), full - 1  # within the range of the scale
-    yield "colour_chart", lambda: charts.colour_chart().image(size) * _card(studio, frontal), 0
+    yield "grey_scale", lambda: charts.grey_scale().image(size) * card_radiance(studio, frontal), full
+    yield (
+        "grey_scale_card",
+        partial(card_radiance, studio, frontal),
+        full - 1,
+    )  # within its range
+    yield "colour_chart", lambda: charts.colour_chart().image(size) * card_radiance(studio, frontal), 0
     for light, name in enumerate(studio.lights.names):
         yield f"spheres/{name}", partial(spheres.radiance, studio.camera, studio.lights, light), 0
         if studio.lights.near:
-            yield f"flat/{name}", partial(_card, studio, light), 0
+            yield f"flat/{name}", partial(card_radiance, studio, light), 0
 
 
-def _card(studio: Studio, light: int) -> Array:
+def card_radiance(studio: Studio, light: int) -> Array:
     """Return the radiance of a perfect white diffuser that fills the frame, under one light."""
     height, width = studio.size
     px = studio.camera.mm_per_px or 1.0

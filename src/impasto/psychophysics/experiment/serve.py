@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import secrets
-import socket
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 
 from impasto.errors import OptionError, Problem
+from impasto.listening import listen, shown_host
 from impasto.psychophysics.experiment.database import database_url, open_database
 from impasto.psychophysics.experiment.manifest import ExperimentError, read_experiment
 from impasto.psychophysics.experiment.server.app import WEB, make_app
@@ -71,10 +71,9 @@ def serve(
     engine = open_database(database_url(database, folder), described)
     token = admin_token(folder)
     app = make_app(Served(folder, described, engine, token, Limits()))
-    listening = _listen(host, port)
+    listening = listen(host, port)
     scheme = "https" if certificate else "http"
-    shown = host if host not in ("0.0.0.0", "::") else socket.gethostname()
-    address = f"{scheme}://{shown}:{listening.getsockname()[1]}"
+    address = f"{scheme}://{shown_host(host)}:{listening.getsockname()[1]}"
     say(f"{described.texts.title}: {address}/#CODE for observers, CODE as impasto experiment invite gives it")
     say(f"laboratory: {address}/admin#{token}")
     config = uvicorn.Config(
@@ -114,19 +113,3 @@ def admin_token(folder: Path) -> str:
     except FileExistsError:
         pass
     return path.read_text().strip()
-
-
-def _listen(host: str, port: int) -> socket.socket:
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    listening = socket.socket(family, socket.SOCK_STREAM)
-    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listening.bind((host, port))
-        listening.listen(128)
-    except OSError as error:
-        listening.close()
-        do = "Choose another --port, 0 for any that is free, or the --host of this machine"
-        raise OptionError(
-            Problem(f"{host}:{port}", f"cannot be listened at: {error.strerror}", do)
-        ) from error
-    return listening

@@ -1,0 +1,1 @@
+"""Cameras of a stand: one file per kind, listed in `impasto.stand.drivers`."""

@@ -1,0 +1,85 @@
+"""Is a photograph as sharp as the others?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from impasto.stand.checks.finding import Finding
+from impasto.stand.look import Look
+from impasto.stand.plan_file import Limits
+from impasto.stand.steps import Shot
+
+# Bands of detail, as pairs of Gaussian widths in pixels: a blur of a pixel halves the first and leaves the
+# second nearly as it is.
+_FINE, _COARSE = (0.8, 1.6), (2.5, 5.0)
+
+# The frame is compared in so many fields a side; a highlight that wanders blunts some of them, a blur all.
+_FIELDS = 6
+_QUANTILE = 0.7
+
+Band = NDArray[np.float64]
+
+
+def sharpness(look: Look, references: Sequence[Look]) -> float:
+    """Return how much fine detail a photograph has for its coarse detail, against others; 1 for as much.
+
+    Parameters
+    ----------
+    look : Look
+    references : sequence of Look
+        Photographs under lamps near to its own.
+
+    Notes
+    -----
+    Detail is weighed by where the references have theirs, so that noise, dust and highlights count little,
+    and compared field by field of the frame. Where the references differ among themselves, the least sharp
+    of them sets the measure. Measured on photographs of an icon and of a plaster cat, each against four of
+    those taken before it: originals have 0.97 or more, those blurred by a Gaussian of 1 px at most 0.83, of
+    2 px 0.55.
+    """
+    own, theirs = [], []
+    for number, part in enumerate(look.parts):
+        bands = [_bands(other.parts[number]) for other in references]
+        weights = [np.sum(each, axis=0) for each in zip(*bands, strict=True)]
+        fields = np.array([_fields(each, weights) for each in bands])
+        usual = np.median(fields, axis=0)
+        own.append(_fields(_bands(part), weights) / usual)
+        theirs.append(fields / usual)
+    sharpest = np.quantile(np.concatenate(own), _QUANTILE)
+    least = np.quantile(np.concatenate(theirs, axis=1), _QUANTILE, axis=1).min()
+    return float(sharpest / min(1.0, least))
+
+
+def blurred(look: Look, shot: Shot, references: Sequence[Look], limits: Limits) -> list[Finding]:
+    """Return whether a photograph is less sharp than those under lamps near its own."""
+    if not references or (found := sharpness(look, references)) >= 1 - limits.blur:
+        return []
+    least = f"at least {1 - limits.blur:.0%} planned"
+    what = f"has {found:.0%} of the fine detail of photographs under lamps near its own, {least}"
+    do = "See that focus and stand are locked and nobody walks about, then take it again"
+    return [Finding("blurred", (shot.name,), what, do)]
+
+
+def _bands(level: NDArray[np.float16]) -> tuple[Band, Band]:
+    image = level.astype(np.float64)
+    window = np.sqrt(np.outer(np.hanning(image.shape[0]), np.hanning(image.shape[1])))
+    fine, coarse = (
+        gaussian_filter(image, narrow) - gaussian_filter(image, wide) for narrow, wide in (_FINE, _COARSE)
+    )
+    return np.abs(fine) * window, np.abs(coarse) * window
+
+
+def _fields(bands: tuple[Band, Band], weights: Sequence[Band]) -> NDArray[np.float64]:
+    """Return the ratio of fine to coarse detail in each field of the frame."""
+    fine, coarse = (_sums(band * weight) for band, weight in zip(bands, weights, strict=True))
+    return np.asarray((fine + 1e-12) / (coarse + 1e-12))
+
+
+def _sums(image: Band) -> NDArray[np.float64]:
+    rows, columns = image.shape[0] // _FIELDS, image.shape[1] // _FIELDS
+    cut = image[: rows * _FIELDS, : columns * _FIELDS].reshape(_FIELDS, rows, _FIELDS, columns)
+    return np.asarray(cut.sum(axis=(1, 3)).ravel())
