@@ -79,7 +79,7 @@ def test_each_command_is_explained(name):
     assert re.match(rf"Example: impasto {name}\b", command.epilog)
     assert all(parameter.help for parameter in command.params)
     assert any(f"impasto {name}" in page.read_text(encoding="utf-8") for page in PAGES)
-    # `impasto calibrate lights` is impasto.calibrate.lights in Python; impasto.capture reads what was captured.
+    # `impasto calibrate lights` is impasto.calibrate.lights in Python; impasto.capture reads captures.
     path = name.replace("capture ", "stand ").replace(" ", ".")
     assert callable(operator.attrgetter(path)(impasto)) or name == "models"
 

@@ -16,11 +16,14 @@ if TYPE_CHECKING:
     from impasto.stand.steps import Shot
 
 CAMERAS = {
+    "gphoto2": "impasto.stand.cameras.gphoto2:GPhoto2Camera",
     "folder": "impasto.stand.cameras.folder:FolderCamera",
     "simulated": "impasto.stand.cameras.simulated:SimulatedCamera",
 }
 LIGHTS = {
     "hand": "impasto.stand.lights.hand:HandLight",
+    "gcode": "impasto.stand.lights.gcode:GCodeLight",
+    "dmx": "impasto.stand.lights.dmx:DmxLight",
     "command": "impasto.stand.lights.command:CommandLight",
     "simulated": "impasto.stand.lights.simulated:SimulatedLight",
 }
