@@ -273,6 +273,8 @@ class _Run:
             self.folder.journal.write("finding", name=shot.name, findings=[str(each) for each in findings])
             if self._decide(findings, choices) == _AGAIN:
                 self.folder.refuse(arrived, shot.name, "; ".join(finding.what for finding in findings))
+                if any(finding.check == "light" for finding in findings):
+                    self._lit = None  # a lamp that did not fire is told again
                 return False
         self.folder.add(shot, arrived, kept_with=[f"{each.check}: {each.what}" for each in findings])
         self.judge.accept(shot, look)

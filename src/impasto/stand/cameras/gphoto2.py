@@ -126,6 +126,9 @@ class GPhoto2Camera:
             if error.code != self._gp.GP_ERROR_NOT_SUPPORTED:
                 raise
             time.sleep(_POLL_S)
+            # A driver without events keeps the list of files that it read first, until it is opened anew.
+            self._camera.exit()
+            self._camera.init()
             return []
         if kind == self._gp.GP_EVENT_FILE_ADDED and _is_photograph(data.name):
             return [(data.folder, data.name)]

@@ -126,7 +126,8 @@ class GCodeLight:
                     break
         else:
             raise self._problem("nobody answers", "See that the arm is on, and that port and baud are right")
-        self._line.reset_input_buffer()
+        while self._read_line():  # what it still says about waking up must not pass for a later answer
+            pass
         if self._settings.home:
             self._home()
 
