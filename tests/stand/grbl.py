@@ -10,9 +10,9 @@ import tty
 class Grbl:
     """An emulated controller on a pseudo-terminal.
 
-    Lines are answered with ``ok`` or ``error:N`` when they are taken, before the arm has moved. The characters
-    ``?``, ``!``, ``~`` and Ctrl-X are taken out of the stream at once, wherever they stand. A move beyond the
-    travel raises ``ALARM:2`` and locks the controller until it is homed or unlocked.
+    Lines are answered with ``ok`` or ``error:N`` when they are taken, before the arm has moved. The
+    characters ``?``, ``!``, ``~`` and Ctrl-X are taken out of the stream at once, wherever they stand. A move
+    beyond the travel raises ``ALARM:2`` and locks the controller until it is homed or unlocked.
     """
 
     BANNER = "\r\nGrbl 1.1h ['$' for help]\r\n"

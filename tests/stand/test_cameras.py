@@ -36,7 +36,7 @@ def directory_plan(folder, card):
 
 
 def test_photographs_are_fetched_through_libgphoto2(photographs, tmp_path):
-    """Somebody releases the camera when the program asks for it: a file appears on its card, in a subfolder."""
+    """Somebody releases the camera when the program asks: a file appears on its card, in a subfolder."""
     card = tmp_path / "card" / "DCIM"
     card.mkdir(parents=True)
     shutil.copyfile(photographs[0], card / "OLD_0001.TIF")  # what was there before is not taken
@@ -63,7 +63,7 @@ def test_a_camera_that_does_not_release_is_named(tmp_path):
     (tmp_path / "card").mkdir()
     made = stand_of(directory_plan(tmp_path, tmp_path / "card"), Desk())
     camera = open_camera(made)
-    with pytest.raises(DriverError, match="no photograph has arrived for 1.5 s"):
+    with pytest.raises(DriverError, match=r"no photograph has arrived for 1\.5 s"):
         camera.take(shots(made.plan)[0], tmp_path)
     camera.close()
 
@@ -175,7 +175,7 @@ def test_a_file_that_never_gets_whole_is_named(watched):
     tifffile.imwrite(folder / "IMG_0001.TIF", np.zeros((64, 96, 3), np.uint16), photometric="rgb")
     data = (folder / "IMG_0001.TIF").read_bytes()
     (folder / "IMG_0001.TIF").write_bytes(data[: len(data) // 2])
-    with pytest.raises(DriverError, match="IMG_0001.TIF"):
+    with pytest.raises(DriverError, match=r"IMG_0001\.TIF"):
         camera.take(shots(made.plan)[0], incoming)
 
 

@@ -180,7 +180,7 @@ def test_a_full_disk_is_named_and_the_same_command_goes_on(clean, tmp_path, monk
 
     with monkeypatch.context() as patch:
         patch.setattr(journals.Journal, "_append", full)
-        with pytest.raises(OutputError, match="No space left|no room left"):
+        with pytest.raises(OutputError, match=r"No space left|no room left"):
             stand.run(clean[0], photos, say=quiet)
     with pytest.raises(CaptureError):
         impasto.stack(photos, tmp_path / "store.zarr")
