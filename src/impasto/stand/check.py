@@ -110,7 +110,7 @@ def check(
         photographs=len(taken),
         names=tuple(shot.name for shot in longest),
         clipped=np.array([looks[shot].clipped for shot in longest]),
-        shift_px=np.array([judge.shift_px(shot, looks[shot]) for shot in longest]),
+        shift_px=np.array([judge.shift_px.get(shot.name, (np.nan, np.nan)) for shot in longest]),
         findings=(*findings, *judge.order(), *_dust(Path(folder))),
         coverage=judge.coverage(),
     )

@@ -36,6 +36,12 @@ class Judge:
         Where the plan has the lamps; the names are those of `Shot.place`.
     camera : Camera
     limits : Limits
+
+    Attributes
+    ----------
+    shift_px : dict of str to (float, float)
+        By how many columns and rows each photograph lay off those near it when it was last judged; NaN where
+        nobody can tell.
     """
 
     def __init__(self, lights: Lights, camera: Camera, limits: Limits) -> None:
@@ -43,6 +49,7 @@ class Judge:
         self._number = {name: number for number, name in enumerate(lights.names)}
         self._seen: dict[str, Seen] = {}
         self._digests: dict[str, str] = {}
+        self.shift_px: dict[str, tuple[float, float]] = {}
 
     def judge(self, shot: Shot, look: Look) -> list[Finding]:
         """Return what is wrong with a photograph, given those that were accepted."""
@@ -89,12 +96,6 @@ class Judge:
         names = [seen.shot.name for seen in long]
         return order.exchanged(names, [seen.look for seen in long], self._directions(long))
 
-    def shift_px(self, shot: Shot, look: Look) -> tuple[float, float]:
-        """Return by how many columns and rows a photograph lies off those near it; NaN if nobody can tell."""
-        near = self._near(shot)
-        found = movement.shift_px(look, near) if near else None
-        return (math.nan, math.nan) if found is None else found
-
     def room(self) -> list[Finding]:
         """Return whether the room was dark enough, once lamps were seen too."""
         return [
@@ -122,8 +123,10 @@ class Judge:
 
     def _still_and_sharp(self, shot: Shot, look: Look) -> list[Finding]:
         near = self._near(shot)
+        shift = movement.shift_px(look, near) if near else None
+        self.shift_px[shot.name] = shift or (math.nan, math.nan)
         return [
-            *movement.moved(look, shot, near, self.limits),
+            *movement.moved(shift, shot, self.limits),
             *sharpness.blurred(look, shot, near, self.limits),
         ]
 
@@ -135,7 +138,7 @@ class Judge:
         next_longer = max(longer, key=lambda seen: seen.shot.bracket)
         return [
             *exposure.exposure_ratio(look, shot, next_longer.look, next_longer.shot),
-            *movement.moved(look, shot, [next_longer.look], self.limits),
+            *movement.moved(movement.shift_px(look, [next_longer.look]), shot, self.limits),
         ]
 
     def _longest(self) -> Iterable[Seen]:

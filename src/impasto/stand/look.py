@@ -20,11 +20,10 @@ from impasto.colour import linearisation_table
 _REDUCED_PX, _SMALL_PX = 900, 48
 _BAND_ROWS = 512
 _BINS = 64
-# Below this share of full scale a sample tells little more than noise.
-_DARK = 0.004
+_BRIGHT_PERCENT = 95
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Look:
     """What is kept of a photograph that was seen.
 
@@ -33,8 +32,8 @@ class Look:
     photograph : Photograph
     pixels_sha256 : str
         Digest of the decoded values, which a copy shares whatever its name and metadata are.
-    clipped, dark : float
-        Shares of the samples at full scale, and below 0.4 % of it.
+    clipped : float
+        Share of the samples at full scale.
     histogram : ndarray of shape (C, 64)
         Shares of the samples per channel, over the square root of the linear values.
     reduced : ndarray of shape (h, w, C), float32
@@ -50,7 +49,6 @@ class Look:
     photograph: Photograph
     pixels_sha256: str
     clipped: float
-    dark: float
     histogram: NDArray[np.float64]
     reduced: NDArray[np.float32]
     reduced_clipped: NDArray[np.bool_]
@@ -58,9 +56,9 @@ class Look:
     parts_clipped: tuple[NDArray[np.bool_], ...]
 
     @property
-    def level(self) -> float:
-        """Median relative radiance, over the channels too."""
-        return float(np.median(self.reduced))
+    def bright(self) -> float:
+        """Relative radiance that a twentieth of the picture reaches: dark surroundings do not count."""
+        return float(np.percentile(np.minimum(self.reduced, 1.0), _BRIGHT_PERCENT))
 
     @property
     def small(self) -> NDArray[np.float32]:
@@ -108,7 +106,7 @@ def look_at(path: Path, transfer: str | None = None, clip_level: float | None = 
     level = CLIP_LEVEL[photograph.dtype.name] if clip_level is None else clip_level
     linear = _linear(photograph)
     digest = hashlib.sha256()
-    clipped = dark = 0
+    clipped = 0
     histogram = np.zeros((channels, _BINS), np.int64)
     band_rows = max(1, _BAND_ROWS // step) * step
     for row, band in photograph.bands(band_rows):
@@ -116,7 +114,6 @@ def look_at(path: Path, transfer: str | None = None, clip_level: float | None = 
         over = np.asarray(band >= level)
         values: NDArray[Any] = linear(band)
         clipped += int(np.count_nonzero(over))
-        dark += int(np.count_nonzero(values < _DARK))
         bins = np.clip(np.sqrt(np.maximum(values, 0)) * _BINS, 0, _BINS - 1).astype(np.uint8)
         for channel in range(channels):
             histogram[channel] += np.bincount(bins[..., channel].ravel(), minlength=_BINS)
@@ -135,7 +132,6 @@ def look_at(path: Path, transfer: str | None = None, clip_level: float | None = 
         photograph=photograph,
         pixels_sha256=digest.hexdigest(),
         clipped=clipped / samples,
-        dark=dark / samples,
         histogram=histogram / (height * width),
         reduced=reduced,
         reduced_clipped=lost,

@@ -66,8 +66,8 @@ class Limits(Table):
     """The table ``[limits]``: from when on a photograph is to be taken again; see docs/copy-stand.md."""
 
     clipped: _Share = 0.001
-    dark: _Share = 0.5
-    moved_px: Positive = 0.35
+    dark: _Share = 0.03
+    moved_px: Positive = 0.3
     blur: Annotated[float, Field(gt=0, lt=1)] = 0.15
     ambient: _Share = 0.01
 

@@ -37,7 +37,7 @@ def show_photograph(desk: Desk, shot: Shot, look: Look, findings: Sequence[Findi
             "name": shot.name,
             "label": shot.label,
             "clipped": look.clipped,
-            "dark": look.dark,
+            "bright": look.bright,
             "histogram": look.histogram.tolist(),
             "findings": [{"check": each.check, "what": each.what, "do": each.do} for each in findings],
         }

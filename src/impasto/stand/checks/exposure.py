@@ -39,17 +39,17 @@ def clipped(look: Look, shot: Shot, limits: Limits) -> list[Finding]:
 
 
 def dark(look: Look, shot: Shot, limits: Limits) -> list[Finding]:
-    """Return whether too much of the longest exposure is black, or a dark frame is not."""
+    """Return whether the longest exposure is too short, or a dark frame is none."""
     if shot.kind == "dark":
-        if look.level <= _CAP:
+        if look.bright <= _CAP:
             return []
-        what = f"a dark frame reads {look.level:.1%} of full scale, expected below {_CAP:.0%}"
+        what = f"a dark frame reads {look.bright:.1%} of full scale, expected below {_CAP:.0%}"
         return [Finding("dark", (shot.name,), what, "Put the cap on the lens")]
-    if shot.kind in ("ambient", "spheres") or shot.bracket or look.dark <= limits.dark:
+    if shot.kind in ("ambient", "spheres") or shot.bracket or look.bright >= limits.dark:
         return []
     what = (
-        f"{look.dark:.0%} of the samples are below 0.4 % of full scale in the longest exposure, at most "
-        f"{limits.dark:.0%} planned"
+        f"19 of 20 pixels are below {look.bright:.1%} of full scale in the longest exposure; planned is that "
+        f"the brightest reach {limits.dark:.0%}"
     )
     do = f"See that the lamp is on and the cap is off, or lengthen {shutter(shot.exposure_s)} in the plan"
     return [Finding("dark", (shot.name,), what, do)]

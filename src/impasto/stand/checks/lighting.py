@@ -12,12 +12,14 @@ from impasto.stand.look import Look
 from impasto.stand.plan_file import Limits
 from impasto.stand.steps import Shot
 
-# A lamp near another may light the painting by this factor more or less than the cosine says: paint is no
-# perfect diffuser, and relief throws shadows at grazing angles.
-_FACTOR = 3.0
+# A lamp near another may light the painting by this factor more or less than the cosine says: lamps differ,
+# paint is no perfect diffuser, and relief throws shadows at grazing angles.
+_FACTOR = 5.0
 _NEAR_DEG = 35.0
+# Pixels count that have this share of the other photograph's bright ones: neither black cloth nor shadows.
+_LIT = 0.1
 # Less than this share of full scale is no light at all.
-_BLACK = 0.002
+_BLACK = 0.005
 
 
 def fired(
@@ -36,9 +38,9 @@ def fired(
     """
     near = sorted((other for other in others if other[2] <= _NEAR_DEG), key=lambda other: other[2])[:3]
     if not near:
-        if look.level > _BLACK:
+        if look.bright > _BLACK:
             return []
-        what = f"reads {look.level:.2%} of full scale: there is no light"
+        what = f"reads {look.bright:.2%} of full scale: there is no light"
     else:
         ratio = float(np.median([_ratio(look, other) * other[1] for other in near if other[1]]) / irradiance)
         if 1 / _FACTOR <= ratio <= _FACTOR:
@@ -64,8 +66,8 @@ def ambient(look: Look, shot: Shot, others: Sequence[tuple[Look, Shot]], limits:
     """
     if not others:
         return []
-    lit = float(np.median([_level(other) / at.exposure_s for other, at in others]))
-    share = look.level / shot.exposure_s / lit
+    lit = float(np.median([other.bright / at.exposure_s for other, at in others]))
+    share = look.bright / shot.exposure_s / lit
     if share <= limits.ambient:
         return []
     what = f"the room gives {share:.1%} of the light of a lamp, at most {limits.ambient:.1%} planned"
@@ -81,9 +83,5 @@ def angles_deg(direction: Array, others: Array) -> Array:
 def _ratio(look: Look, other: tuple[Look, float, float]) -> float:
     """Return the median ratio of two pictures, which highlights do not change."""
     a, b = look.small, other[0].reduced
-    usable = np.isfinite(a) & np.isfinite(b) & (b > 0)
+    usable = np.isfinite(a) & np.isfinite(b) & (b > _LIT * other[0].bright)
     return float(np.median(a[usable] / b[usable])) if usable.any() else 1 / max(other[1], 1e-12)
-
-
-def _level(look: Look) -> float:
-    return float(np.median(np.where(np.isfinite(look.reduced), look.reduced, 1.0)))

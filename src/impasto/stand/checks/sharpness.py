@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,12 +43,12 @@ def sharpness(look: Look, references: Sequence[Look]) -> float:
     2 px 0.55.
     """
     own, theirs = [], []
-    for number, part in enumerate(look.parts):
-        bands = [_bands(other.parts[number]) for other in references]
+    for number in range(len(look.parts)):
+        bands = [_bands(other, number) for other in references]
         weights = [np.sum(each, axis=0) for each in zip(*bands, strict=True)]
         fields = np.array([_fields(each, weights) for each in bands])
         usual = np.median(fields, axis=0)
-        own.append(_fields(_bands(part), weights) / usual)
+        own.append(_fields(_bands(look, number), weights) / usual)
         theirs.append(fields / usual)
     sharpest = np.quantile(np.concatenate(own), _QUANTILE)
     least = np.quantile(np.concatenate(theirs, axis=1), _QUANTILE, axis=1).min()
@@ -64,8 +65,10 @@ def blurred(look: Look, shot: Shot, references: Sequence[Look], limits: Limits) 
     return [Finding("blurred", (shot.name,), what, do)]
 
 
-def _bands(level: NDArray[np.float16]) -> tuple[Band, Band]:
-    image = level.astype(np.float64)
+@lru_cache(maxsize=60)
+def _bands(look: Look, part: int) -> tuple[Band, Band]:
+    """Return fine and coarse detail of a part; kept as `movement` keeps edges."""
+    image = look.parts[part].astype(np.float64)
     window = np.sqrt(np.outer(np.hanning(image.shape[0]), np.hanning(image.shape[1])))
     fine, coarse = (
         gaussian_filter(image, narrow) - gaussian_filter(image, wide) for narrow, wide in (_FINE, _COARSE)

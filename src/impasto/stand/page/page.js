@@ -67,7 +67,7 @@ function showPhotograph(state) {
   }
   element("caption").textContent = `${seen.name}: ${seen.label}`;
   element("shares").textContent =
-    `${percent(seen.clipped)} clipped (marked red), ${percent(seen.dark)} nearly black`;
+    `${percent(seen.clipped)} clipped (marked red); a twentieth reaches ${percent(seen.bright)} of full scale`;
   list("findings", state.question?.problem ? [] : seen.findings.map((finding) => finding.what));
   drawHistogram(seen.histogram);
 }
