@@ -284,8 +284,8 @@ class PixelGloss:
                 np.tile(values, (len(light), 1)),
                 **_optics(attributes),
             )
-            table.append(meter.gloss(weight @ np.column_stack([diffuse, specular]) / len(light)))
-        self.grid = grid = np.reshape(table, (*(len(axis) for axis in axes), -1))
+            table.append(weight @ np.column_stack([diffuse, specular]) / len(light))
+        self.grid = grid = np.reshape(meter.gloss(table), (*(len(axis) for axis in axes), -1))
         self._constant = grid.reshape(-1) if not axes else None
         if axes:
             # Readings vary over decades with the width of the lobe.
