@@ -1,14 +1,27 @@
-"""A store with a fit of every model, its maps drawn at random."""
+"""A store with a fit of every model, its maps drawn at random; some have a residual term too."""
 
 import numpy as np
 
 import impasto
 from impasto.capture.simulate import simulate
+from impasto.fit.light_process import hull_of
+from impasto.geometry import dome_direction
 from impasto.models import MODELS
-from impasto.store import MapsWriter, fit_group, fit_maps, level_sizes, open_stack, units
+from impasto.residual import ZERO
+from impasto.store import (
+    RESIDUAL,
+    MapsWriter,
+    fit_group,
+    fit_maps,
+    level_sizes,
+    open_stack,
+    residual_map,
+    units,
+)
 from impasto.store.hierarchy import coarser_group
 
 SEED = 8
+COMPONENTS = 7  # no multiple of four, by which they lie in the page's textures
 
 
 def write_every_model(folder, width, height):
@@ -28,6 +41,10 @@ def write_every_model(folder, width, height):
             "light_rgb": [1.04, 1.0, 0.96],
             "status_meaning": {},
         }
+        if spec.ambient:  # for half of the models
+            *others, status = maps
+            maps = (*others, residual_map(COMPONENTS), status)
+            attributes[RESIDUAL] = _random_residual(channels)
         sizes = [(height, width), *level_sizes(height, width)]
         for level, size in enumerate(sizes):
             group = coarser_group(spec.name, level) if level else fit_group(spec.name)
@@ -36,6 +53,23 @@ def write_every_model(folder, width, height):
                 writer.write(unit, _random_maps(spec, maps, unit))
             writer.finish({})
     return store
+
+
+def _random_residual(channels):
+    """Return functions of the light's direction, over lights up to 60°: others are outside of their hull."""
+    rng = np.random.default_rng(SEED)
+    direction = dome_direction(np.arccos(rng.uniform(0.5, 1, 24)), rng.uniform(0, 2 * np.pi, 24))
+    return {
+        "components": COMPONENTS,
+        "zero": ZERO,
+        "step": (1e-3 / np.arange(1, COMPONENTS + 1)).tolist(),
+        "toe": 0.004,
+        "direction": direction.tolist(),
+        "length": 0.35,
+        "weights": rng.normal(0, 0.02, (COMPONENTS, channels, 24)).tolist(),
+        "hull": hull_of(direction).tolist(),
+        "fade": 0.17,
+    }
 
 
 def _random_maps(spec, maps, unit):
@@ -60,11 +94,13 @@ def _random_maps(spec, maps, unit):
     if spec.ambient:
         values["ambient"] = between(1e-3, 0.1, values["ambient"].shape[2])
     values["status"][:] = 0
+    if RESIDUAL in values:
+        values[RESIDUAL] = ZERO + rng.normal(0, 1500, (*size, COMPONENTS)).clip(-ZERO, ZERO - 1)
     drawn = rng.random(size)
     for name in ("specular", *spec.shape_names):
         if name in values:
             values[name][drawn < 0.05] = np.nan
     for name in values:
-        if name != "status":
+        if name not in ("status", RESIDUAL):
             values[name][drawn < 0.02] = np.nan
     return {name: np.asarray(values[name], map.dtype) for name, map in ((map.name, map) for map in maps)}

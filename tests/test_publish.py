@@ -13,9 +13,13 @@ from tests.store_files import contents
 
 import impasto
 from impasto.errors import OptionError, OutputError, StoreError
+from impasto.fit.light_process import hull_of
+from impasto.geometry import dome_direction
 from impasto.publish.height import integrate_normals
+from impasto.publish.residual import PackedResidual
+from impasto.residual import ZERO, ResidualTerm
 from impasto.store import open_fit, open_published
-from impasto.store.published import Parameter, linear, logarithmic, pack, parameter_columns
+from impasto.store.packing import Parameter, linear, logarithmic, pack, parameter_columns
 from impasto.view import serve
 
 MODEL = "torrance-sparrow"
@@ -79,6 +83,42 @@ def test_a_published_fit_is_the_fit_to_the_stated_error(painting, site):
         np.testing.assert_allclose(got[name][small], 0, atol=1e-6)
     np.testing.assert_allclose(got["normal"][..., :2], want["normal"][..., :2], atol=1.6e-5)
     np.testing.assert_allclose(got["normal"][..., 2], want["normal"][..., 2], atol=1e-3)
+
+
+@pytest.mark.parametrize("spread", [1.0, 30.0])
+def test_a_residual_is_published_to_the_stated_error(spread):
+    """Coefficients of 6 components with long tails, from a hundredth of a display's step on."""
+    rng = np.random.default_rng(2)
+    direction = dome_direction(np.arccos(rng.uniform(0.3, 1, 30)), rng.uniform(0, 2 * np.pi, 30))
+    found = {
+        "components": 6,
+        "zero": ZERO,
+        "step": (np.array([4, 3, 2, 2, 1, 1]) * 1e-5 * spread).tolist(),
+        "toe": 0.004,
+        "direction": direction.tolist(),
+        "length": 0.4,
+        "weights": rng.normal(0, 0.05, (6, 3, 30)).tolist(),
+        "hull": hull_of(direction).tolist(),
+        "fade": 0.17,
+    }
+    packed = PackedResidual({"residual": found})
+    before, after = (ResidualTerm.of({"residual": each}) for each in (found, packed.attributes))
+
+    def sums(term, codes):
+        return np.einsum("pk,lkc->plc", term.coefficients(codes) * term.step, term.basis(direction))
+
+    small = np.clip(rng.normal(0, 300 / spread, (4000, 6)), -ZERO, ZERO - 1) + ZERO
+    large = np.clip(rng.standard_t(2, (4000, 6)) * 3000, -ZERO, ZERO - 1) + ZERO
+    errors = []
+    for codes in (small.astype(np.uint16), large.astype(np.uint16)):
+        errors.append(sums(after, packed.pack(codes)) - sums(before, codes))
+    stated = packed.attributes["quantisation"]
+    assert 0.7 * stated["rounding"] < np.sqrt(np.mean(np.square(errors[0]))) < 1.1 * stated["rounding"]
+    coefficient = before.coefficients(large.astype(np.uint16)) * before.step
+    moved = np.abs(after.coefficients(packed.pack(large.astype(np.uint16))) - coefficient)
+    finest = after.table[129]
+    assert (moved <= 0.51 * finest + 1.01 * stated["relative"] * np.abs(coefficient)).all()
+    assert (packed.pack(np.full((1, 6), ZERO, np.uint16)) == 128).all()
 
 
 def test_a_published_store_renders_as_the_store_does(painting, site, tmp_path):

@@ -13,6 +13,9 @@ from tests.viewer_pages import complete, pictures, static_host
 import impasto
 from impasto.geometry import Lights, dome_direction
 from impasto.models import MODELS
+from impasto.render import render_bands
+from impasto.render.display import requested_rendition
+from impasto.store import open_published
 
 WIDTH, HEIGHT = 544, 512
 LIGHTS = 20
@@ -65,27 +68,62 @@ def random_lights(seed):
     return lights, page
 
 
+def rendered(store, model, lights):
+    """Yield what `impasto render` shows under each light, without its files: (height, width, RGB), uint8."""
+    fit, stack = open_published(store, model)
+    rendition = requested_rendition(
+        stack, display="srgb", exposure=1.0, white_point=None, adaptation="cat16", highlights="clip"
+    )
+    bands = [band.radiance for band in render_bands(fit, lights, stack.camera)]
+    for radiance in np.concatenate(bands, axis=1):
+        yield np.rint(255 * rendition(radiance).drive).astype(np.uint8)
+
+
+def test_rendered_in_memory_is_what_the_command_writes(published, tmp_path):
+    lights, _ = random_lights(3)
+    store, one = published / "painting.zarr", lights.select(slice(0, 1))
+    impasto.render(store, model="phong", lights=one, out=tmp_path, animate=False)
+    (picture,) = rendered(store, "phong", one)
+    difference = np.abs(picture.astype(int) - np.asarray(Image.open(tmp_path / "0.png")))
+    assert difference.max() <= 1
+    assert np.mean(difference > 0) < 1e-4  # halves may be rounded to either side
+
+
 @pytest.mark.parametrize("model", MODELS)
-def test_the_page_draws_what_the_core_renders(model, published, page, tmp_path):
+def test_the_page_draws_what_the_core_renders(model, published, page):
     lights, shown = random_lights(sum(map(ord, model)))
-    # The ambient term is one sum in the shader for all; a few lights tell whether it is there.
-    count = 3 if "ambient" in model else LIGHTS
-    store = published / "painting.zarr"
-    impasto.render(store, model=model, lights=lights.select(slice(0, count)), out=tmp_path, animate=False)
+    # The ambient and the residual term are the same lines of the shader for all models; a few lights tell
+    # whether they are there, and all of them for one model that they are right.
+    count = 3 if "ambient" in model and model != "torrance-sparrow-ambient" else LIGHTS
     view = {"x": WIDTH / 2, "y": HEIGHT / 2, "scale": 1}
     page.evaluate("hash => { document.querySelector('impasto-viewer').hash = hash }", f"model={model}")
     complete(page)
     states = [{"lights": [light], "view": view} for light in shown[:count]]
+    expected = rendered(published / "painting.zarr", model, lights.select(slice(0, count)))
     differences = []
-    for number, drawn in enumerate(pictures(page, states)):
-        rendered = np.asarray(Image.open(tmp_path / f"{number}.png")).astype(int)
-        assert rendered.shape == (HEIGHT, WIDTH, 3)
-        differences.append(np.abs(rendered - np.asarray(drawn.convert("RGB"))).max(axis=2))
-        assert rendered.std() > 10  # there is something to compare
+    for want, got in zip(expected, pictures(page, states), strict=True):
+        assert want.shape == got.shape == (HEIGHT, WIDTH, 3)
+        assert want.std() > 10  # there is something to compare
+        differences.append(np.abs(want.astype(int) - got).max(axis=2))
     differences = np.array(differences)
     assert differences.max() <= 2
     assert np.mean(differences <= 1) >= 0.999
     print(f"{model}: {np.mean(differences == 0):.6f} equal, {np.mean(differences <= 1):.6f} within 1")
+
+
+def test_the_residual_is_added_only_where_asked_and_under_lights_that_tell_it(published, page):
+    model = "torrance-sparrow-ambient"
+    viewer = "document.querySelector('impasto-viewer')"
+    page.evaluate(f"{viewer}.hash = 'model={model}'")
+    complete(page)
+    light = page.evaluate(f"{viewer}.state.lights[0]")
+    near, far = {**light, "zenith": 20, "azimuth": 0}, {**light, "zenith": 88, "azimuth": 0}
+    states = [{"lights": [each], "residual": added} for each in (near, far) for added in (True, False)]
+    inside, inside_alone, outside, outside_alone = pictures(page, states)
+    assert np.abs(inside.astype(int) - inside_alone).mean() > 3
+    difference = np.abs(outside.astype(int) - outside_alone)
+    assert difference.max() <= 1
+    assert np.mean(difference > 0) < 1e-4  # rounding of the square root and back
 
 
 def golden_cases():

@@ -44,7 +44,7 @@ class Pixels:
         For models with the term.
     view_tilt : ndarray of shape (P,) or None
         The view of each pixel, in the plane of the arm, as the paper's procedure has it in its literal form.
-    residual : ndarray of shape (P, K), uint16, or None
+    residual : ndarray of shape (P, K), uint16 (of a published store uint8), or None
         Codes of what the model leaves over; None leaves it away.
     """
 
@@ -58,7 +58,7 @@ class Pixels:
     shape: Map
     ambient: Map | None
     view_tilt: Map | None
-    residual: NDArray[np.uint16] | None = None
+    residual: NDArray[np.unsignedinteger] | None = None
 
     def __len__(self) -> int:
         return len(self.row)

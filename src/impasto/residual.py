@@ -68,13 +68,15 @@ class ResidualTerm:
         Length of the kernel.
     weights : ndarray of shape (K, C, N)
     step : ndarray of shape (K,)
-        Coefficient per step of the codes.
+        Coefficient per step of the codes from `ZERO`.
     toe : float
         Of the encoding.
     hull : ndarray of shape (F, 3)
         Unit vectors that point into the hull of the lights from each of its sides.
     fade : float
         Sine of the angle over which the term fades outside of the hull.
+    table : ndarray of shape (256,), float32, or None
+        Of a published store, what stands for a code in place of its distance from `ZERO`.
     """
 
     direction: Array
@@ -84,6 +86,7 @@ class ResidualTerm:
     toe: float
     hull: Array
     fade: float
+    table: Values | None = None
 
     @classmethod
     def of(cls, attributes: Mapping[str, Any]) -> ResidualTerm | None:
@@ -95,14 +98,16 @@ class ResidualTerm:
         def array(name: str) -> Array:
             return np.array(found[name], np.float64)
 
+        published = "table" in found
         return cls(
             direction=array("direction"),
             length=float(found["length"]),
             weights=array("weights"),
-            step=array("step"),
+            step=np.ones(found["components"]) if published else array("step"),
             toe=float(found["toe"]),
             hull=array("hull"),
             fade=float(found["fade"]),
+            table=array("table").astype(np.float32) if published else None,
         )
 
     @property
@@ -123,8 +128,17 @@ class ResidualTerm:
         result: Array = values * self.share(direction)[:, None, None]
         return result
 
+    def coefficients(self, codes: NDArray[np.unsignedinteger]) -> Values:
+        """Return the coefficients of codes (..., K), as multiples of `step`."""
+        if self.table is not None:
+            published: Values = self.table[codes]
+            return published
+        values: Values = codes.astype(np.float32)
+        values -= np.float32(ZERO)
+        return values
+
     def add(
-        self, radiance: Values, codes: NDArray[np.uint16], direction: ArrayLike, irradiance: Values
+        self, radiance: Values, codes: NDArray[np.unsignedinteger], direction: ArrayLike, irradiance: Values
     ) -> None:
         """Add the term to the radiance of pixels, in place.
 
@@ -132,7 +146,7 @@ class ResidualTerm:
         ----------
         radiance : ndarray of shape (L, P, C), float32
             As the model gives it; NaN stays NaN.
-        codes : ndarray of shape (P, K), uint16
+        codes : ndarray of shape (P, K), uint16, of a published store uint8
         direction : ndarray of shape (L, 3)
             Of the lights.
         irradiance : ndarray of shape (L, P or 1, C), float32
@@ -148,15 +162,14 @@ class ResidualTerm:
 
         def add_to(first: int) -> None:
             part = slice(first, first + rows)
-            coefficients = codes[part].astype(np.float32)
-            coefficients -= np.float32(ZERO)
-            added = (coefficients @ table).reshape(-1, lights, channels).transpose(1, 0, 2)
+            added = (self.coefficients(codes[part]) @ table).reshape(-1, lights, channels).transpose(1, 0, 2)
             share = irradiance if irradiance.shape[1] == 1 else irradiance[:, part]
             dark = ~(share > 0.0)
             values = encode(radiance[:, part] / np.where(dark, np.float32(1.0), share), self.toe)
             values += added
             result = decode(values, self.toe)
-            result *= share
+            with np.errstate(over="ignore"):  # the narrowest lobes reach the largest numbers that there are
+                result *= share
             np.copyto(radiance[:, part], result, where=np.isfinite(radiance[:, part]) & ~dark)
 
         with ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="residual") as pool:

@@ -4,23 +4,24 @@
 
 import { type BasisCase, type BasisOptics, evaluateBasis } from "./gl/basis";
 import { Renderer } from "./gl/renderer";
-import type { Content, Range, Scene, View } from "./gl/scene";
+import type { Scene, View } from "./gl/scene";
 import { findModel, MODELS, type Model } from "./models";
 import { asProblem, type StoreProblem } from "./store/errors";
-import { type ModelEntry, PublishedStore } from "./store/published";
+import { PublishedStore } from "./store/published";
 import { Annotations } from "./ui/annotations";
-import { download, h, svg } from "./ui/dom";
+import { download, h } from "./ui/dom";
 import { attachGestures, type GestureTarget } from "./ui/gestures";
 import { fromPlace, ontoArm } from "./ui/hemisphere";
-import { type Messages, messagesFor } from "./ui/i18n";
+import { messagesFor } from "./ui/i18n";
 import { Inspector } from "./ui/inspector";
-import { legend } from "./ui/legend";
-import { angles, shaderLights } from "./ui/lights";
-import { columnLabel, contentOf, findColumn, findRange, hasLegend } from "./ui/maps";
+import { Layout } from "./ui/layout";
 import { NotesPanel } from "./ui/notes-panel";
+import type { Rule } from "./ui/overlay";
 import { Panel, type Tool } from "./ui/panel";
-import { withProfile } from "./ui/snapshot";
-import { clamp, fromHash, initialState, type Light, type State, toHash } from "./ui/state";
+import { Scenes } from "./ui/scenes";
+import { saved } from "./ui/snapshot";
+import { fromHash, initialState, type Light, type State, toHash } from "./ui/state";
+import { fitted, panned, toPage, toPicture, type Viewport, zoomed } from "./ui/viewport";
 import css from "./viewer.css?inline";
 
 export type { Light, State } from "./ui/state";
@@ -40,36 +41,32 @@ sheet.replaceSync(css);
 
 const MEGABYTE = 1 << 20;
 const DEFAULT_CACHE_MB = 160;
-const NARROW_PX = 700;
 const SETTLED_MS = 160;
-const NO_RANGE: Range = { low: 0, high: 1, logarithmic: false };
-const LARGEST_SCALE = 32;
-const MOST_PROBLEMS = 3;
+/** How long to leave a compiler alone: before there is anything to see, and after. */
+const COMPILE_MS = { nothing: 8, something: 100 };
+const COPIED_MS = 2500;
+
+/** Everything that there is once a store is open. */
+interface Opened {
+  readonly store: PublishedStore;
+  readonly scenes: Scenes;
+  readonly inspector: Inspector;
+  readonly panel: Panel;
+  readonly notes: NotesPanel;
+  renderer: Renderer;
+}
 
 export class ImpastoViewer extends HTMLElement implements GestureTarget {
   static readonly observedAttributes = ["src", "lang", "cache-mb"];
 
   readonly #root = this.attachShadow({ mode: "open" });
-  #messages: Messages = messagesFor([]);
-  #canvas = h("canvas");
-  #stage = h("div");
-  #side = h("div");
-  #details = h("div");
-  #overlay = h("div");
-  #problems = h("div");
-  #showSide: (open: boolean) => void = () => {};
-  #divider = h("div");
-  #handle = h("button");
-  #store: PublishedStore | null = null;
-  #renderer: Renderer | null = null;
-  #inspector: Inspector | null = null;
-  #panel: Panel | null = null;
-  #notes: NotesPanel | null = null;
+  #layout = new Layout(messagesFor([]), this);
+  #opened: Opened | null = null;
   #state: State = initialState("");
   #given = ""; // a state asked for before the store was there
   #tool: Tool = "inspect";
-  #rule: { x1: number; y1: number; x2: number; y2: number } | null = null;
-  #ranges = new Map<string, Range>();
+  #rule: Rule | null = null;
+  #draggingLight = false;
   #opening: AbortController | null = null;
   #frame = 0;
   #changed = 0;
@@ -91,17 +88,18 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     return toHash(this.#state);
   }
   set hash(hash: string) {
-    if (this.#store) this.#change(this.#known(fromHash(hash, { ...this.#state, view: null })));
+    if (this.#opened) this.#change(this.#opened.scenes.known(fromHash(hash, { ...this.#state, view: null })));
     else this.#given = hash;
   }
 
   /** Whether all tiles of the present view are drawn. */
   get complete(): boolean {
-    return this.#ready && this.#frame === 0 && this.#renderer?.tiles.pending === 0;
+    const renderer = this.#opened?.renderer;
+    return this.#ready && this.#frame === 0 && !renderer?.compiling && renderer?.tiles.pending === 0;
   }
 
   get store(): PublishedStore | null {
-    return this.#store;
+    return this.#opened?.store ?? null;
   }
 
   /** The models that the shader knows. */
@@ -112,13 +110,13 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
   /** Basis values of a model as the graphics card computes them: diffuse, and one per lobe, for each case. */
   basis(model: string, optics: BasisOptics, cases: readonly BasisCase[]): number[][] {
     const found = findModel(model);
-    if (!found || !this.#renderer) throw new Error(`no model ${model}, or no store yet`);
-    return evaluateBasis(this.#renderer.gl, found, optics, cases);
+    if (!found || !this.#opened) throw new Error(`no model ${model}, or no store yet`);
+    return evaluateBasis(this.#opened.renderer.gl, found, optics, cases);
   }
 
   /** Bytes of tiles on the graphics card. */
   get cacheBytes(): number {
-    return this.#renderer?.tiles.bytes ?? 0;
+    return this.#opened?.renderer.tiles.bytes ?? 0;
   }
 
   connectedCallback(): void {
@@ -139,15 +137,20 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     this.#resize.disconnect();
     cancelAnimationFrame(this.#frame);
     this.#frame = 0;
-    this.#renderer?.dispose();
-    this.#renderer = this.#store = this.#inspector = this.#panel = null;
+    this.#opened?.renderer.dispose();
+    this.#opened = null;
     this.#ready = false;
   }
 
   async #open(): Promise<void> {
     this.#close();
-    this.#messages = messagesFor([this.lang || document.documentElement.lang, ...navigator.languages]);
-    this.#layOut();
+    const messages = messagesFor([this.lang || document.documentElement.lang, ...navigator.languages]);
+    this.#layout = new Layout(messages, this);
+    this.#root.replaceChildren(this.#layout.frame);
+    this.#layout.showSide(!this.hasAttribute("closed"));
+    this.#resize.observe(this.#layout.stage);
+    this.#resize.observe(this);
+    attachGestures(this.#layout.canvas, this);
     const src = this.getAttribute("src");
     if (!src) return;
     this.#opening = new AbortController();
@@ -155,104 +158,71 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     this.#started = performance.now();
     this.#first = 0;
     try {
-      const store = await PublishedStore.open(new URL(src, document.baseURI), signal);
-      if (!signal.aborted) this.#begin(store);
+      const opening = PublishedStore.open(new URL(src, document.baseURI), signal);
+      opening.catch(() => {}); // told below
+      // While the store's metadata are on their way the graphics card wakes up.
+      await new Promise((resolve) => setTimeout(resolve));
+      const gl = this.#layout.context();
+      const store = await opening;
+      if (!signal.aborted) this.#begin(store, gl);
     } catch (error) {
-      if (!signal.aborted) this.#fatal(this.#words(asProblem(error, src)), true);
+      if (signal.aborted) return;
+      this.#layout.fail(this.#layout.problems.words(asProblem(error, src)), () => void this.#open());
     }
   }
 
-  #layOut(): void {
-    const m = this.#messages;
-    this.#canvas = h("canvas", { tabindex: 0, role: "img", "aria-label": m.picture });
-    this.#overlay = h("div", { class: "overlay" }, h("div", { class: "status", role: "status" }, m.loading));
-    this.#problems = h("div", { class: "messages", role: "log", "aria-live": "polite" });
-    this.#details = h("div", { class: "details", role: "region", "aria-live": "polite", hidden: true });
-    this.#side = h("div", { class: "side", id: "side" });
-    const toggle = h(
-      "button",
-      { type: "button", class: "toggle", "aria-expanded": "true", "aria-controls": "side" },
-      "☰",
-    );
-    this.#showSide = (open) => {
-      this.#side.classList.toggle("closed", !open);
-      toggle.setAttribute("aria-expanded", String(open));
-      toggle.setAttribute("aria-label", open ? m.hideControls : m.showControls);
-    };
-    toggle.addEventListener("click", () => this.#showSide(this.#side.classList.contains("closed")));
-    this.#divider = this.#newDivider();
-    this.#stage = h(
-      "div",
-      { class: "stage" },
-      this.#canvas,
-      this.#overlay,
-      this.#divider,
-      this.#problems,
-      toggle,
-    );
-    const frame = h("div", { class: "frame" }, this.#stage, this.#side);
-    this.#root.replaceChildren(frame);
-    this.#showSide(!this.hasAttribute("closed"));
-    this.#resize.observe(this.#stage);
-    this.#resize.observe(this);
-    attachGestures(this.#canvas, this);
-    this.#canvas.addEventListener("keydown", (event) => this.#key(event));
-  }
-
-  #begin(store: PublishedStore): void {
-    const m = this.#messages;
-    const { models, title } = store.attributes;
-    if (models.length === 0) {
-      this.#fatal(m.noModels, false);
+  #begin(store: PublishedStore, gl: WebGL2RenderingContext | null): void {
+    const { messages, canvas } = this.#layout;
+    const [model] = store.attributes.models;
+    if (!model || !gl) {
+      this.#layout.fail(model ? messages.noWebgl : messages.noModels);
       return;
     }
-    const gl = this.#canvas.getContext("webgl2", {
-      antialias: false,
-      alpha: false,
-      depth: false,
-      preserveDrawingBuffer: false,
-    });
-    if (!gl) {
-      this.#fatal(m.noWebgl, false);
-      return;
-    }
-    this.#store = store;
-    this.#renderer = this.#newRenderer(gl, store);
-    this.#canvas.addEventListener("webglcontextlost", (event) => {
-      event.preventDefault();
-      this.#say(m.lostContext);
-    });
-    this.#canvas.addEventListener("webglcontextrestored", () => {
-      this.#renderer = this.#newRenderer(gl, store);
-      this.#problems.replaceChildren();
+    const redraw = () => {
+      this.#drawOverlay();
       this.#draw();
-    });
-    this.#inspector = new Inspector(gl, store, m);
-    this.#ranges.clear();
-    this.#panel = new Panel(store, m, {
-      change: (change) => this.#change(change),
-      light: (change) => this.#changeLight(change),
-      tool: (tool) => this.#choose(tool),
-      fit: () => this.#change({ view: null }),
-      fullSize: () => this.#change({ view: { ...this.#view(), scale: 1 } }),
-      zoom: (factor) => this.zoom(factor, this.#stage.clientWidth / 2, this.#stage.clientHeight / 2),
-      snapshot: () => void this.#saveSnapshot(),
-      bookmark: () => void this.#copyAddress(),
-      lightAsPhotograph: () => this.#lightAsPhotograph(),
-    });
-    this.#notes = new NotesPanel(m, new Annotations(store.http.url.href), {
+    };
+    const scenes = new Scenes(store, redraw, (problem) => this.#report(problem));
+    const notes = new NotesPanel(messages, new Annotations(store.http.url.href), {
       hash: () => this.hash,
       show: (hash) => {
         this.hash = hash;
       },
       change: () => this.#drawOverlay(),
     });
-    this.#side.replaceChildren(h("h2", {}, title), this.#details, this.#panel.element, this.#notes.element);
-    this.#state = initialState(models[0]!.name);
-    const given = this.#given || this.getAttribute("state") || "";
-    this.#state = this.#known(fromHash(given, this.#state));
+    const panel = this.#newPanel(store);
+    const inspector = new Inspector(gl, store, messages);
+    const renderer = this.#newRenderer(gl, store);
+    this.#opened = { store, scenes, inspector, panel, notes, renderer };
+    canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault();
+      this.#layout.problems.say(messages.lostContext);
+    });
+    canvas.addEventListener("webglcontextrestored", () => {
+      if (this.#opened) this.#opened.renderer = this.#newRenderer(gl, store);
+      this.#layout.problems.clear();
+      this.#draw();
+    });
+    this.#state = initialState(model.name);
+    this.#state = scenes.known(fromHash(this.#given || this.getAttribute("state") || "", this.#state));
     this.#fitCanvas();
     this.#change({});
+    // Tiles and programs are on their way by now.
+    this.#layout.fill(store.attributes.title, panel.element, notes.element);
+  }
+
+  #newPanel(store: PublishedStore): Panel {
+    return new Panel(store, this.#layout.messages, {
+      change: (change) => this.#change(change),
+      light: (change) => this.#changeLight(change),
+      tool: (tool) => this.#choose(tool),
+      fit: () => this.#change({ view: null }),
+      fullSize: () => this.#change({ view: { ...this.#view(), scale: 1 } }),
+      zoom: (factor) => this.zoom(factor, ...this.#layout.middle),
+      snapshot: () => void this.#saveSnapshot(),
+      bookmark: () => void this.#copyAddress(),
+      lightAsPhotograph: () => this.#lightAsPhotograph(),
+    });
   }
 
   #newRenderer(gl: WebGL2RenderingContext, store: PublishedStore): Renderer {
@@ -263,43 +233,15 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     return renderer;
   }
 
-  /** A state with what this store does not have replaced. */
-  #known(state: State): State {
-    const { models, photographs } = this.#store!.attributes;
-    const has = (name: string) => models.some((model) => model.name === name);
-    const [kind, which] = state.compare.split(":");
-    const photograph = which === "nearest" || Number(which) < (photographs?.lights.length ?? 0);
-    const comparable = kind === "model" ? has(which!) : kind === "photograph" && photographs && photograph;
-    const near = this.#store!.attributes.camera.mm_per_px !== null;
-    return {
-      ...state,
-      model: has(state.model) ? state.model : models[0]!.name,
-      compare: comparable ? state.compare : "",
-      lights: near ? state.lights : state.lights.map((light) => ({ ...light, distance_mm: null })),
-    };
-  }
-
-  #model(name = this.#state.model): ModelEntry {
-    const { models } = this.#store!.attributes;
-    return models.find((model) => model.name === name) ?? models[0]!;
-  }
-
   #change(change: Partial<State>): void {
-    let state = { ...this.#state, ...change };
-    if (change.arm) {
-      const lights = state.lights.map((light) => ({ ...light, ...ontoArm(light.zenith, light.azimuth) }));
-      state = { ...state, lights };
-    }
-    const model = this.#model(state.model);
-    if (state.show.includes(":") && !findColumn(state.show, model)) state = { ...state, show: "radiance" };
-    if (state.show === "specular" && model.lobes === 0) state = { ...state, show: "radiance" };
-    this.#state = state;
+    if (!this.#opened) return;
+    const { scenes, panel } = this.#opened;
+    this.#state = scenes.after(this.#state, change);
     this.#changed = performance.now();
-    this.#panel?.update(state);
+    panel.update(this.#state);
     this.#drawOverlay();
     this.#draw();
-    const detail = { state, hash: this.hash };
-    this.dispatchEvent(new CustomEvent("impasto-change", { detail, bubbles: true, composed: true }));
+    this.#tell("impasto-change", { state: this.#state, hash: this.hash });
   }
 
   #changeLight(change: Partial<Light>): void {
@@ -309,114 +251,41 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     this.#change({ lights });
   }
 
+  #lightAsPhotograph(): void {
+    const photograph = this.#opened!.scenes.photograph(this.#state);
+    if (photograph === null) return;
+    this.#change({ arm: false, lights: [this.#state.lights[this.#state.active]!], active: 0 });
+    this.#changeLight(this.#opened!.scenes.lightOf(photograph));
+  }
+
+  #tell(name: keyof ImpastoViewerEvents, detail: unknown): void {
+    this.dispatchEvent(new CustomEvent(name, { detail, bubbles: true, composed: true }));
+  }
+
   // Drawing
 
   #fitCanvas(): void {
-    const frame = this.#root.querySelector(".frame");
-    frame?.classList.toggle("narrow", this.clientWidth < NARROW_PX);
-    const ratio = window.devicePixelRatio || 1;
-    const width = Math.max(Math.round(this.#stage.clientWidth * ratio), 1);
-    const height = Math.max(Math.round(this.#stage.clientHeight * ratio), 1);
-    if (this.#canvas.width !== width || this.#canvas.height !== height) {
-      this.#canvas.width = width;
-      this.#canvas.height = height;
-      if (this.#renderer) this.#drawNow();
-    }
+    if (this.#layout.fitCanvas(this.clientWidth) && this.#opened) this.#drawNow();
     this.#drawOverlay();
   }
 
-  #ratio(): number {
-    return this.#canvas.width / Math.max(this.#stage.clientWidth, 1);
-  }
-
-  #paneWidth(): number {
-    return this.#canvas.width / (this.#state.compare && this.#state.split === "side" ? 2 : 1);
+  #viewport(): Viewport {
+    const { width, height } = this.#layout.canvas;
+    const panes = this.#state.compare && this.#state.split === "side" ? 2 : 1;
+    return { width, height, pane: width / panes, ratio: this.#layout.ratio };
   }
 
   #view(): View {
-    const { width, height } = this.#store!;
-    const fitted = Math.min(this.#paneWidth() / width, this.#canvas.height / height);
-    return this.#state.view ?? { x: width / 2, y: height / 2, scale: fitted };
+    return this.#state.view ?? fitted(this.#viewport(), this.#opened!.store);
   }
 
-  #scene(): Scene {
-    const state = this.#state;
-    return {
-      view: this.#view(),
-      contents: this.#contents(),
-      swipe: state.split === "swipe" ? state.swipe : null,
-      lights: shaderLights(state.lights, this.#store!.attributes.display.matrix),
-      exposure: 2 ** state.exposure,
-      exaggeration: state.exaggeration,
-      smooth: performance.now() - this.#changed > SETTLED_MS && this.#view().scale < 1,
-    };
-  }
-
-  #contents(): [Content] | [Content, Content] {
-    const { show, compare } = this.#state;
-    const first = contentOf(show, this.#model(), this.#store!, this.#range(show, this.#model()));
-    const photograph = this.#photograph();
-    if (photograph !== null) return [first, { kind: "photograph", light: photograph }];
-    if (!compare) return [first];
-    const other = this.#model(compare.slice("model:".length));
-    return [first, contentOf(show, other, this.#store!, this.#range(show, this.#model()))];
-  }
-
-  #range(show: string, model: ModelEntry): Range {
-    const key = `${model.name} ${show}`;
-    const known = this.#ranges.get(key);
-    if (known || !hasLegend(show, model)) return known ?? NO_RANGE;
-    this.#ranges.set(key, NO_RANGE);
-    findRange(show, model, this.#store!).then(
-      (range) => {
-        this.#ranges.set(key, range);
-        this.#drawOverlay();
-        this.#draw();
-      },
-      (error) => this.#report(asProblem(error, this.#store!.http.url.href)),
-    );
-    return NO_RANGE;
-  }
-
-  /** Which photograph is compared with, if one is. */
-  #photograph(): number | null {
-    const [kind, which] = this.#state.compare.split(":");
-    if (kind !== "photograph") return null;
-    return which === "nearest" ? this.#nearestPhotograph().index : Number(which);
-  }
-
-  #nearestPhotograph(): { index: number; angle_deg: number } {
-    const [light] = shaderLights(
-      [{ ...this.#state.lights[this.#state.active]!, size_deg: 0, distance_mm: null }],
-      [],
-    );
-    const cosines = this.#store!.attributes.photographs!.lights.map(({ direction }) =>
-      direction.reduce((sum, value, i) => sum + value * light!.place[i]!, 0),
-    );
-    const index = cosines.indexOf(Math.max(...cosines));
-    return { index, angle_deg: (Math.acos(clamp(cosines[index]!, -1, 1)) * 180) / Math.PI };
-  }
-
-  #lightAsPhotograph(): void {
-    const photograph = this.#photograph();
-    if (photograph === null) return;
-    const {
-      direction,
-      position_mm: position,
-      intensity,
-    } = this.#store!.attributes.photographs!.lights[photograph]!;
-    const near = position && this.#store!.attributes.camera.mm_per_px !== null;
-    const mean = intensity.reduce((sum, value) => sum + value, 0) / intensity.length;
-    this.#change({ arm: false, lights: [this.#state.lights[this.#state.active]!], active: 0 });
-    this.#changeLight({
-      ...angles(near ? position : direction),
-      distance_mm: near ? Math.hypot(...position) : null,
-      intensity: mean,
-    });
+  #scene(still: boolean): Scene {
+    const view = this.#view();
+    return this.#opened!.scenes.scene(this.#state, view, still && view.scale < 1);
   }
 
   #draw(): void {
-    if (this.#frame || !this.#renderer) return;
+    if (this.#frame || !this.#opened) return;
     this.#frame = requestAnimationFrame(() => {
       this.#frame = 0;
       this.#drawNow();
@@ -424,15 +293,12 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
   }
 
   #drawNow(): void {
-    const scene = this.#scene();
-    const complete = this.#renderer!.draw(scene);
-    if (!this.#first && this.cacheBytes) this.#first = performance.now() - this.#started;
-    if (complete && !this.#ready) {
-      this.#ready = true;
-      this.#drawOverlay();
-      const milliseconds = performance.now() - this.#started;
-      const detail = { requests: this.#store!.http.requests, milliseconds, first: this.#first };
-      this.dispatchEvent(new CustomEvent("impasto-ready", { detail, bubbles: true, composed: true }));
+    const { renderer } = this.#opened!;
+    const scene = this.#scene(performance.now() - this.#changed > SETTLED_MS);
+    const complete = renderer.draw(scene);
+    this.#milestones(renderer, complete);
+    if (renderer.compiling) {
+      setTimeout(() => this.#draw(), renderer.drawn ? COMPILE_MS.something : COMPILE_MS.nothing);
     }
     // Once more, smoothly, when nothing has changed for a while.
     if (!scene.smooth && scene.view.scale < 1) {
@@ -441,146 +307,65 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     }
   }
 
-  #drawOverlay(): void {
-    if (!this.#store) return;
-    const m = this.#messages;
-    const state = this.#state;
-    const parts: Element[] = [];
-    this.#divider.hidden = !state.compare;
-    if (!this.#ready) parts.push(h("div", { class: "status", role: "status" }, m.loading));
-    if (hasLegend(state.show, this.#model())) parts.push(this.#legend());
-    if (state.compare) parts.push(...this.#captions());
-    if (this.#rule) parts.push(...this.#drawRule(this.#rule));
-    this.#notes?.annotations.list.forEach((note, i) => {
-      const [x, y] = this.toPage(note.x, note.y);
-      const mark = h(
-        "button",
-        { type: "button", class: "note", title: note.text, "aria-label": note.text },
-        String(i + 1),
-      );
-      mark.style.left = `${x}px`;
-      mark.style.top = `${y}px`;
-      mark.addEventListener("click", () => this.#notes!.open(note.id));
-      parts.push(mark);
-    });
-    this.#overlay.replaceChildren(...parts);
-  }
-
-  #legend(): HTMLElement {
-    const m = this.#messages;
-    const { show } = this.#state;
-    const model = this.#model();
-    const range = this.#range(show, model);
-    const found = findColumn(show, model);
-    if (found) return legend(columnLabel(found.column, model, found.of, m), found.column.units, range);
-    if (show === "height") return legend(m.height, this.#store!.attributes.height!.column.units, range);
-    if (show === "ratio") return legend(m.ratio, "", range);
-    return legend(m.gloss, this.#store!.attributes.white_reference ? m.glossUnits : m.relativeGloss, range);
-  }
-
-  #captions(): Element[] {
-    const m = this.#messages;
-    const { split, swipe, compare, model } = this.#state;
-    const share = split === "swipe" ? swipe : 0.5;
-    this.#divider.style.left = `${100 * share}%`;
-    this.#handle.hidden = split === "side";
-    const photograph = this.#photograph();
-    let other = compare.slice("model:".length);
-    if (photograph !== null) {
-      const { name } = this.#store!.attributes.photographs!.lights[photograph]!;
-      other = m.photograph(name);
-      if (compare === "photograph:nearest")
-        other += `, ${m.degreesAway(this.#nearestPhotograph().angle_deg)}`;
+  /** Notes when the first picture, and all of it, has been drawn in fact. */
+  #milestones(renderer: Renderer, complete: boolean): void {
+    if (this.#ready || !renderer.drawn) return;
+    const drawn = renderer.finished().then(() => performance.now() - this.#started);
+    if (!this.#first) {
+      this.#first = Number.POSITIVE_INFINITY;
+      void drawn.then((milliseconds) => (this.#first = Math.min(this.#first, milliseconds)));
     }
-    return [h("div", { class: "caption" }, model), h("div", { class: "caption right" }, other)];
+    if (!complete) return;
+    this.#ready = true;
+    this.#drawOverlay();
+    const { requests } = this.#opened!.store.http;
+    void drawn.then((milliseconds) => {
+      this.#tell("impasto-ready", { requests, milliseconds, first: Math.min(this.#first, milliseconds) });
+    });
   }
 
-  /** The swipe line, which stays where it is in the document, or a drag of it would end. */
-  #newDivider(): HTMLDivElement {
-    const handle = h("button", { type: "button", "aria-label": this.#messages.swipe }, "⇔");
-    this.#handle = handle;
-    handle.addEventListener("pointerdown", (event) => handle.setPointerCapture(event.pointerId));
-    handle.addEventListener("pointermove", (event) => {
-      if (!handle.hasPointerCapture(event.pointerId)) return;
-      const box = this.#stage.getBoundingClientRect();
-      this.#change({ swipe: clamp((event.clientX - box.left) / box.width, 0, 1) });
+  #drawOverlay(): void {
+    if (!this.#opened) return;
+    this.#layout.overlay.update(this.#opened.scenes, {
+      state: this.#state,
+      loading: !this.#ready,
+      rule: this.#rule,
+      notes: this.#opened.notes.annotations.list,
+      toPage: (x, y) => this.toPage(x, y),
     });
-    handle.addEventListener("keydown", (event) => {
-      const step = { ArrowLeft: -0.02, ArrowRight: 0.02 }[event.key];
-      if (step === undefined) return;
-      event.preventDefault();
-      this.#change({ swipe: clamp(this.#state.swipe + step, 0, 1) });
-    });
-    return h("div", { class: "divider", hidden: true }, handle);
-  }
-
-  #drawRule(rule: { x1: number; y1: number; x2: number; y2: number }): Element[] {
-    const [x1, y1] = this.toPage(rule.x1, rule.y1);
-    const [x2, y2] = this.toPage(rule.x2, rule.y2);
-    const pixels = Math.hypot(rule.x2 - rule.x1, rule.y2 - rule.y1);
-    const mm = this.#store!.attributes.camera.mm_per_px;
-    const text = this.#messages.length(mm ? `${(pixels * mm).toPrecision(4)} mm` : `${pixels.toFixed(0)} px`);
-    return [
-      svg("svg", {}, svg("line", { x1, y1, x2, y2, class: "rule" })),
-      h("div", { class: "caption above", role: "status" }, text),
-    ];
   }
 
   // Places
 
   /** The place in the picture, in its pixels, that lies under a place in the element. */
   toPicture(x: number, y: number): [number, number] {
-    const view = this.#view();
-    const ratio = this.#ratio();
-    const pane = this.#paneWidth();
-    const across = (x * ratio) % pane;
-    return [
-      view.x + (across - pane / 2) / view.scale,
-      view.y + (y * ratio - this.#canvas.height / 2) / view.scale,
-    ];
+    return toPicture(this.#viewport(), this.#view(), x, y);
   }
 
   /** The place in the element under which a place of the picture lies. */
   toPage(x: number, y: number): [number, number] {
-    const view = this.#view();
-    const ratio = this.#ratio();
-    return [
-      ((x - view.x) * view.scale + this.#paneWidth() / 2) / ratio,
-      ((y - view.y) * view.scale + this.#canvas.height / 2) / ratio,
-    ];
+    return toPage(this.#viewport(), this.#view(), x, y);
   }
 
   // What gestures and keys ask for
 
   pan(dx: number, dy: number): void {
-    if (!this.#store) return;
-    const view = this.#view();
-    const ratio = this.#ratio();
-    const x = clamp(view.x - (dx * ratio) / view.scale, 0, this.#store.width);
-    const y = clamp(view.y - (dy * ratio) / view.scale, 0, this.#store.height);
-    this.#change({ view: { ...view, x, y } });
+    if (!this.#opened) return;
+    this.#change({ view: panned(this.#viewport(), this.#view(), this.#opened.store, dx, dy) });
   }
 
   zoom(factor: number, x: number, y: number): void {
-    if (!this.#store) return;
-    const view = this.#view();
-    const { width, height } = this.#store;
-    const least = Math.min(this.#paneWidth() / width, this.#canvas.height / height, 1) / 2;
-    const scale = clamp(view.scale * factor, least, LARGEST_SCALE);
-    const [px, py] = this.toPicture(x, y);
-    // The place under the pointer stays there.
-    const kept = view.scale / scale;
-    this.#change({ view: { x: px + (view.x - px) * kept, y: py + (view.y - py) * kept, scale } });
+    if (!this.#opened) return;
+    this.#change({ view: zoomed(this.#viewport(), this.#view(), this.#opened.store, factor, x, y) });
   }
 
   drag(phase: "start" | "move" | "end", x: number, y: number, event: PointerEvent): boolean {
-    if (!this.#store) return false;
+    if (!this.#opened) return false;
     if (this.#tool === "light" || (phase === "start" ? event.altKey : this.#draggingLight)) {
       this.#draggingLight = phase !== "end";
-      const side = Math.min(this.#stage.clientWidth, this.#stage.clientHeight) / 2;
-      const [dx, dy] = [x - this.#stage.clientWidth / 2, y - this.#stage.clientHeight / 2];
-      const { zenith, azimuth } = fromPlace((46 * dx) / side, (46 * dy) / side);
-      this.#changeLight({ zenith, azimuth });
+      const [middleX, middleY] = this.#layout.middle;
+      const side = Math.min(middleX, middleY);
+      this.#changeLight(fromPlace((x - middleX) / side, (y - middleY) / side));
       return true;
     }
     if (this.#tool !== "ruler") return false;
@@ -593,63 +378,32 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     return true;
   }
 
-  #draggingLight = false;
-
   tap(x: number, y: number): void {
-    if (!this.#store) return;
+    if (!this.#opened) return;
+    const { store, notes } = this.#opened;
     const [px, py] = this.toPicture(x, y).map(Math.floor) as [number, number];
-    if (px < 0 || py < 0 || px >= this.#store.width || py >= this.#store.height) return;
+    if (px < 0 || py < 0 || px >= store.width || py >= store.height) return;
     if (this.#tool === "annotate") {
-      this.#showSide(true);
-      this.#notes!.write(px, py);
+      this.#layout.showSide(true);
+      notes.write(px, py);
     } else void this.inspect(px, py);
   }
 
-  /** Shows the parameters and the curve of a pixel. */
-  async inspect(x: number, y: number): Promise<void> {
-    const other = this.#state.compare.startsWith("model:") ? [this.#model(this.#state.compare.slice(6))] : [];
-    const { azimuth } = this.#state.lights[this.#state.active]!;
-    this.#details.hidden = false;
-    this.#showSide(true);
-    this.#details.replaceChildren(this.#messages.loading);
-    try {
-      const panel = await this.#inspector!.panel([this.#model(), ...other], x, y, azimuth);
-      const close = h(
-        "button",
-        { type: "button", onclick: () => (this.#details.hidden = true) },
-        this.#messages.close,
-      );
-      this.#details.replaceChildren(panel, close);
-      this.#details.scrollIntoView({ block: "nearest" });
-    } catch (error) {
-      this.#details.hidden = true;
-      this.#report(asProblem(error, this.#store!.http.url.href));
-    }
-    this.dispatchEvent(new CustomEvent("impasto-pixel", { detail: { x, y }, bubbles: true, composed: true }));
-  }
-
-  #choose(tool: Tool): void {
-    this.#tool = tool;
-    if (tool !== "ruler") this.#rule = null;
-    this.#canvas.classList.toggle("tool", tool !== "inspect");
-    this.#drawOverlay();
-  }
-
-  #key(event: KeyboardEvent): void {
-    if (event.ctrlKey || event.metaKey || !this.#store) return;
+  key(event: KeyboardEvent): void {
+    if (event.ctrlKey || event.metaKey || !this.#opened) return;
     const step = event.shiftKey ? 200 : 50;
-    const [x, y] = [this.#stage.clientWidth / 2, this.#stage.clientHeight / 2];
+    const middle = this.#layout.middle;
     const actions: Record<string, () => void> = {
       ArrowLeft: () => this.pan(step, 0),
       ArrowRight: () => this.pan(-step, 0),
       ArrowUp: () => this.pan(0, step),
       ArrowDown: () => this.pan(0, -step),
-      "+": () => this.zoom(1.25, x, y),
-      "=": () => this.zoom(1.25, x, y),
-      "-": () => this.zoom(0.8, x, y),
+      "+": () => this.zoom(1.25, ...middle),
+      "=": () => this.zoom(1.25, ...middle),
+      "-": () => this.zoom(0.8, ...middle),
       "0": () => this.#change({ view: null }),
       "1": () => this.#change({ view: { ...this.#view(), scale: 1 } }),
-      i: () => this.tap(x, y),
+      i: () => this.tap(...middle),
     };
     const action = actions[event.key];
     if (!action) return;
@@ -657,67 +411,77 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     action();
   }
 
+  /** Moves the swipe line. */
+  swipe(change: (share: number) => number): void {
+    this.#change({ swipe: change(this.#state.swipe) });
+  }
+
+  /** Shows the view and the light of a note. */
+  open(note: string): void {
+    this.#opened?.notes.open(note);
+  }
+
+  /** Shows the parameters and the curve of a pixel. */
+  async inspect(x: number, y: number): Promise<void> {
+    const { scenes, inspector, store } = this.#opened!;
+    const { model, compare, lights, active } = this.#state;
+    const shown = [model, ...(compare.startsWith("model:") ? [compare.slice("model:".length)] : [])];
+    const { details, messages } = this.#layout;
+    details.hidden = false;
+    this.#layout.showSide(true);
+    details.replaceChildren(messages.loading);
+    try {
+      const models = shown.map((name) => scenes.model(name));
+      const panel = await inspector.panel(models, x, y, lights[active]!.azimuth);
+      const hide = () => {
+        details.hidden = true;
+      };
+      details.replaceChildren(panel, h("button", { type: "button", onclick: hide }, messages.close));
+      details.scrollIntoView({ block: "nearest" });
+    } catch (error) {
+      details.hidden = true;
+      this.#report(asProblem(error, store.http.url.href));
+    }
+    this.#tell("impasto-pixel", { x, y });
+  }
+
+  #choose(tool: Tool): void {
+    this.#tool = tool;
+    if (tool !== "ruler") this.#rule = null;
+    this.#layout.canvas.classList.toggle("tool", tool !== "inspect");
+    this.#drawOverlay();
+  }
+
   // What leaves the page
 
   /** The present picture as a PNG file with its colour profile. */
   async snapshot(): Promise<Blob> {
-    this.#renderer!.draw({ ...this.#scene(), smooth: this.#view().scale < 1 });
-    const png = await new Promise<Blob>((resolve, reject) =>
-      this.#canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("no picture"))), "image/png"),
-    );
-    const profile = this.#store!.attributes.display.profile;
-    return profile
-      ? withProfile(
-          png,
-          Uint8Array.from(atob(profile), (c) => c.charCodeAt(0)),
-        )
-      : png;
+    const { renderer, store } = this.#opened!;
+    renderer.draw(this.#scene(true), true);
+    return saved(this.#layout.canvas, store.attributes.display.profile);
   }
 
   async #saveSnapshot(): Promise<void> {
-    download(await this.snapshot(), `${this.#store!.attributes.title.replace(/[^\w.-]+/g, "-")}.png`);
+    const { title } = this.#opened!.store.attributes;
+    download(await this.snapshot(), `${title.replace(/[^\w.-]+/g, "-")}.png`);
   }
 
   async #copyAddress(): Promise<void> {
+    const { problems, messages } = this.#layout;
     const url = new URL(location.href);
     url.hash = this.hash;
     try {
       await navigator.clipboard.writeText(url.href);
-      this.#say(this.#messages.copied, 2500);
+      problems.say(messages.copied, COPIED_MS);
     } catch {
-      this.#say(url.href);
+      problems.say(url.href);
     }
-  }
-
-  // What goes wrong
-
-  #words(problem: StoreProblem): string {
-    return this.#messages.problems[problem.kind](problem.where, problem.detail);
   }
 
   #report(problem: StoreProblem): void {
     const { kind, where, detail } = problem;
-    this.dispatchEvent(
-      new CustomEvent("impasto-problem", { detail: { kind, where, detail }, bubbles: true, composed: true }),
-    );
-    this.#say(this.#words(problem));
-  }
-
-  #say(text: string, milliseconds = 0): void {
-    if ([...this.#problems.children].some((child) => child.firstChild?.textContent === text)) return;
-    const box = h("div", { class: "problem" }, h("div", {}, text));
-    box.append(h("button", { type: "button", onclick: () => box.remove() }, this.#messages.dismiss));
-    while (this.#problems.children.length >= MOST_PROBLEMS) this.#problems.firstChild!.remove();
-    this.#problems.append(box);
-    if (milliseconds) setTimeout(() => box.remove(), milliseconds);
-  }
-
-  #fatal(text: string, again: boolean): void {
-    const parts: Element[] = [h("p", { role: "alert" }, text)];
-    if (again)
-      parts.push(h("button", { type: "button", onclick: () => void this.#open() }, this.#messages.again));
-    this.#overlay.replaceChildren();
-    this.#stage.append(h("div", { class: "fatal" }, ...parts));
+    this.#tell("impasto-problem", { kind, where, detail });
+    this.#layout.problems.say(this.#layout.problems.words(problem));
   }
 }
 

@@ -18,8 +18,9 @@ from impasto.output import prepare_folder, remove_partial, write_json, written_w
 from impasto.progress import progress
 from impasto.publish.pages import page_files
 from impasto.publish.publication import SMALL, Publication
+from impasto.publish.residual import ROUNDING
 from impasto.store import is_published, size_on_disk
-from impasto.store.published import QUANTISATION
+from impasto.store.packing import QUANTISATION
 
 STORE_NAME = "painting.zarr"
 _AT_A_TIME = 64
@@ -35,8 +36,8 @@ class PublishSummary:
         The folder.
     models : tuple of str
         The models, in the order in which the page offers them.
-    without_residual : tuple of str
-        Those of them that have a residual term in the store, which is not published.
+    with_residual : tuple of str
+        Those of them that have a residual term.
     photographs : int
         How many photographs are there for comparison.
     size : (int, int)
@@ -49,12 +50,15 @@ class PublishSummary:
         Largest relative error of a parameter by quantisation.
     normal_error : float
         Largest error of a normal's components x and y by quantisation.
+    residual_error : float
+        Root mean square error of a residual term by quantisation where the term is small, on the scale in
+        which it is added; docs/store.md says what it is elsewhere.
     seconds : float
     """
 
     out: Path
     models: tuple[str, ...]
-    without_residual: tuple[str, ...]
+    with_residual: tuple[str, ...]
     photographs: int
     size: tuple[int, int]
     levels: int
@@ -62,6 +66,7 @@ class PublishSummary:
     bytes: int
     parameter_error: float
     normal_error: float
+    residual_error: float
     seconds: float
 
 
@@ -147,7 +152,7 @@ def publish(
     return PublishSummary(
         out=folder,
         models=tuple(entry["name"] for entry in publication.attributes["models"]),
-        without_residual=tuple(publication.without_residual),
+        with_residual=tuple(entry["name"] for entry in publication.attributes["models"] if entry["residual"]),
         photographs=len(kept["lights"]) if kept else 0,
         size=(width, height),
         levels=publication.levels,
@@ -155,6 +160,7 @@ def publish(
         bytes=size_on_disk(folder),
         parameter_error=QUANTISATION["log"],
         normal_error=QUANTISATION["normal"],
+        residual_error=ROUNDING,
         seconds=time.perf_counter() - started,
     )
 

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import cache, partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -24,8 +23,12 @@ from impasto.evaluate.gloss import PixelGloss
 from impasto.evaluate.glossmeter import GLOSSMETERS
 from impasto.fit.pyramid import halve
 from impasto.models import MODELS, parse_model
+from impasto.publish.arrays import Codes, PackedArray, pixels_of
 from impasto.publish.height import integrate_normals
+from impasto.publish.photographs import photograph_arrays, spread
+from impasto.publish.residual import PackedResidual
 from impasto.store import (
+    RESIDUAL,
     Fit,
     Stack,
     fitted_models,
@@ -34,24 +37,15 @@ from impasto.store import (
     open_stack,
     provenance,
 )
-from impasto.store.published import (
-    PHOTOGRAPH_CHUNK,
-    PUBLISHED_CHUNK,
-    PUBLISHED_SCHEMA,
+from impasto.store.packing import (
     QUANTISATION,
-    SHARD,
     Parameter,
-    array_document,
     column_attributes,
-    encode_chunk,
-    encode_shard,
     linear,
-    logarithmic,
     pack,
     parameter_columns,
 )
-
-Codes = NDArray[np.uint16]
+from impasto.store.published import PUBLISHED_CHUNK, PUBLISHED_SCHEMA, encode_chunk, encode_shard
 
 _FIT_ATTRIBUTES = (
     "model",
@@ -70,38 +64,11 @@ _FIT_ATTRIBUTES = (
 _HEIGHT_PX = 2048
 """Longest side of a relief: its integral takes all of it at once."""
 
+_GLOSS_METER, _GLOSS_AXES = 1, 2
+"""The usual geometry, 60°, and how many shape parameters a table of it may have."""
+
 FAST, SMALL = 1, 6
 """How hard gzip tries: for somebody who waits for the chunk, and for a chunk that is kept."""
-
-
-@dataclass(frozen=True)
-class PackedArray:
-    """An array of a published store.
-
-    Parameters
-    ----------
-    shape, chunk : tuple of int
-    dims : tuple of str
-    spatial : int
-        The first of the two axes y and x.
-    read : callable
-        Takes the number of a chunk along each axis and returns its codes, fewer where the array ends.
-    """
-
-    shape: tuple[int, ...]
-    chunk: tuple[int, ...]
-    dims: tuple[str, ...]
-    spatial: int
-    read: Callable[[tuple[int, ...]], Codes]
-
-    @property
-    def grid(self) -> tuple[int, ...]:
-        """How many chunks there are along each axis."""
-        return tuple(-(-length // size) for length, size in zip(self.shape, self.chunk, strict=True))
-
-    def numbers(self) -> Iterator[tuple[int, ...]]:
-        """Yield the number of each chunk."""
-        yield from product(*(range(count) for count in self.grid))
 
 
 class Publication:
@@ -144,9 +111,9 @@ class Publication:
         self.size = (stack.shape[1], stack.shape[2])
         self.levels = 1 + len(level_sizes(*self.size))
         self.arrays: dict[str, PackedArray] = {}
-        self.without_residual: list[str] = []
         entries = [self._add_model(name) for name in names]
-        kept = _spread(stack.lights.direction, photographs)
+        pictures, kept = photograph_arrays(stack, spread(stack.lights.direction, photographs))
+        self.arrays.update(pictures)
         self.attributes: dict[str, Any] = {
             **provenance(),
             "impasto_published": PUBLISHED_SCHEMA,
@@ -160,7 +127,7 @@ class Publication:
             "display": _display(stack),
             "quantisation": QUANTISATION,
             "models": entries,
-            "photographs": self._add_photographs(stack, kept),
+            "photographs": kept,
             "height": self._add_height(names[0]),
         }
 
@@ -169,10 +136,7 @@ class Publication:
 
         The root's holds a copy of all others, so that a browser asks once.
         """
-        documents = {
-            path: array_document(array.shape, array.chunk, array.dims, _shard(array) if shards else None)
-            for path, array in self.arrays.items()
-        }
+        documents = {path: array.document(shards=shards) for path, array in self.arrays.items()}
         parents = {
             path.rsplit("/", depth)[0] for path in documents for depth in range(1, path.count("/") + 1)
         }
@@ -194,12 +158,12 @@ class Publication:
     def chunk(self, path: str, number: tuple[int, ...], level: int = FAST) -> bytes:
         """Return a chunk of an array as it lies on disk; `level` is how hard gzip tries."""
         array = self.arrays[path]
-        return encode_chunk(array.read(number), array.chunk, level)
+        return encode_chunk(array.read(number), array.chunk, array.dtype, level)
 
     def shards(self, path: str) -> Iterator[tuple[tuple[int, ...], Callable[[], bytes]]]:
         """Yield the number of each shard of an array, and what makes its bytes."""
         array = self.arrays[path]
-        per_shard = [a // b for a, b in zip(_shard(array), array.chunk, strict=True)]
+        per_shard = [a // b for a, b in zip(array.shard, array.chunk, strict=True)]
 
         def make(shard: tuple[int, ...]) -> bytes:
             first = [number * count for number, count in zip(shard, per_shard, strict=True)]
@@ -222,8 +186,6 @@ class Publication:
         spec = parse_model(name)
         fits = [open_fit(self.store, name, level) for level in range(self.levels)]
         there = fits[0].names
-        if "residual" in fits[0].attributes:
-            self.without_residual.append(name)
         wanted = ["normal", "diffuse", *(["specular"] if spec.lobes else []), *spec.shape_names]
         wanted += [extra for extra in ("ambient", "view_tilt") if extra in there]
         parameters = parameter_columns(fits[0], wanted)
@@ -232,15 +194,19 @@ class Publication:
             fits[0],
             [each for each in there if each.endswith("_sd")] + [each for each in kept if each in there],
         )
+        residual = PackedResidual(fits[0].attributes) if RESIDUAL in fits[0].attributes else None
         for level, fit in enumerate(fits):
             self._add(f"models/{name}/{level}/parameters", fit, parameters)
             self._add(f"models/{name}/{level}/quality", fit, quality)
+            if residual is not None:
+                self._add_residual(f"models/{name}/{level}/residual", fit, residual)
         attributes = {key: fits[0].attributes[key] for key in _FIT_ATTRIBUTES if key in fits[0].attributes}
         base = name.removesuffix("-no-ambient").removesuffix("-ambient")
+        base = base if base in MODELS else name
         return {
             **attributes,
             "name": name,
-            "base": base if base in MODELS else name,
+            "base": base,
             "title": spec.title,
             "lobes": spec.lobes,
             "shape": [
@@ -249,21 +215,27 @@ class Publication:
             ],
             "parameters": column_attributes(parameters),
             "quality": column_attributes(quality),
-            "gloss": _gloss_tables(fits[0]),
+            "gloss": _gloss_tables(fits[0], base),
+            "residual": None if residual is None else residual.attributes,
         }
 
     def _add(self, path: str, fit: Fit, columns: Sequence[Parameter]) -> None:
-        height, width = fit.shape
         names = list(dict.fromkeys(column.name for column in columns))
+        chunk = (PUBLISHED_CHUNK, PUBLISHED_CHUNK, len(columns))
 
         def read(number: tuple[int, ...]) -> Codes:
-            rows, across = _pixels(number[0], height), _pixels(number[1], width)
-            return pack(fit.read(rows, across, names), columns)
+            return pack(fit.read(*_tile(number, fit.shape), names), columns)
 
-        chunk = (PUBLISHED_CHUNK, PUBLISHED_CHUNK, len(columns))
-        self.arrays[path] = PackedArray(
-            (height, width, len(columns)), chunk, ("y", "x", "parameter"), 0, read
-        )
+        self.arrays[path] = PackedArray((*fit.shape, len(columns)), chunk, ("y", "x", "parameter"), 0, read)
+
+    def _add_residual(self, path: str, fit: Fit, residual: PackedResidual) -> None:
+        chunk = (PUBLISHED_CHUNK, PUBLISHED_CHUNK, residual.components)
+
+        def read(number: tuple[int, ...]) -> Codes:
+            return residual.pack(fit.read(*_tile(number, fit.shape), [RESIDUAL])[RESIDUAL])
+
+        shape = (*fit.shape, residual.components)
+        self.arrays[path] = PackedArray(shape, chunk, ("y", "x", "component"), 0, read, "uint8")
 
     def _add_height(self, model: str) -> dict[str, Any]:
         """Add the relief that a model's normals make, from the finest level that is integrated at once."""
@@ -281,7 +253,7 @@ class Publication:
             height, width = sizes[level]
 
             def read(number: tuple[int, ...], relief: NDArray[Any] = reliefs[-1]) -> Codes:
-                part = relief[_pixels(number[0], len(relief)), _pixels(number[1], relief.shape[1])]
+                part = relief[_tile(number, relief.shape)]
                 return column.encode(part)[..., np.newaxis]
 
             self.arrays[f"height/{level}"] = PackedArray(
@@ -290,87 +262,11 @@ class Publication:
             reliefs.append(np.asarray(halve(reliefs[-1])))
         return {"level": finest, "column": column_attributes([column])[0]}
 
-    def _add_photographs(self, stack: Stack, kept: list[int]) -> dict[str, Any] | None:
-        if not kept:
-            return None
-        channels = stack.shape[3]
-        column = logarithmic("radiance", 0, "1", "relative radiance")
-        tiles = _PhotographTiles(stack, self.size)
-        sizes = [self.size, *level_sizes(*self.size)]
-        for level, (height, width) in enumerate(sizes):
 
-            def read(number: tuple[int, ...], level: int = level) -> Codes:
-                light, row, across, _ = number
-                return column.encode(tiles(kept[light], level, row, across))[np.newaxis]
-
-            self.arrays[f"photographs/{level}"] = PackedArray(
-                (len(kept), height, width, channels),
-                (1, PHOTOGRAPH_CHUNK, PHOTOGRAPH_CHUNK, channels),
-                ("light", "y", "x", "channel"),
-                1,
-                read,
-            )
-        lights = stack.lights
-        intensity = np.broadcast_to(lights.intensity, (len(lights), channels))
-        near = [bool(np.isfinite(place).all()) for place in lights.position_mm]
-        clip = [None if not np.isfinite(level) else level for level in stack.clip_level.tolist()]
-        return {
-            "transfer": column.transfer,
-            "scale": column.scale,
-            "offset": column.offset,
-            "clip_level": clip,
-            "lights": [
-                {
-                    "name": lights.names[index],
-                    "direction": lights.direction[index].tolist(),
-                    "position_mm": lights.position_mm[index].tolist() if near[index] else None,
-                    "intensity": intensity[index].tolist(),
-                }
-                for index in kept
-            ],
-        }
-
-
-class _PhotographTiles:
-    """Tiles of photographs at every level, each made of the four below it."""
-
-    def __init__(self, stack: Stack, size: tuple[int, int]) -> None:
-        self._stack = stack
-        self._sizes = [size, *level_sizes(*size)]
-        # A tile of one level and its neighbours are asked for one after the other.
-        self._cached: Callable[..., NDArray[np.float32]] = lru_cache(maxsize=64)(self._make)
-
-    def __call__(self, light: int, level: int, row: int, column: int) -> NDArray[np.float32]:
-        return self._cached(light, level, row, column)
-
-    def _make(self, light: int, level: int, row: int, column: int) -> NDArray[np.float32]:
-        height, width = self._sizes[level]
-        rows, columns = _pixels(row, height, PHOTOGRAPH_CHUNK), _pixels(column, width, PHOTOGRAPH_CHUNK)
-        if level == 0:
-            radiance: NDArray[np.float32] = self._stack.radiance(rows, columns, [light])[0]
-            return radiance
-        tile = np.empty(
-            (rows.stop - rows.start, columns.stop - columns.start, self._stack.shape[3]), np.float32
-        )
-        half = PHOTOGRAPH_CHUNK // 2
-        for down, right in product((0, 1), repeat=2):
-            part = tile[down * half : (down + 1) * half, right * half : (right + 1) * half]
-            if part.size:
-                part[...] = halve(self(light, level - 1, 2 * row + down, 2 * column + right))
-        return tile
-
-
-def _pixels(number: int, length: int, size: int = PUBLISHED_CHUNK) -> slice:
-    return slice(number * size, min((number + 1) * size, length))
-
-
-def _shard(array: PackedArray) -> tuple[int, ...]:
-    """Return the shape of an array's shards: larger along y and x."""
-    sizes = list(array.chunk)
-    for axis in (array.spatial, array.spatial + 1):
-        # No larger than the picture needs: the index lists every chunk of a shard.
-        sizes[axis] = min(SHARD, array.grid[axis] * array.chunk[axis])
-    return tuple(sizes)
+def _tile(number: tuple[int, ...], size: tuple[int, ...]) -> tuple[slice, slice]:
+    """Return the rows and columns of a chunk of maps."""
+    rows, columns = (pixels_of(*each, PUBLISHED_CHUNK) for each in zip(number[:2], size[:2], strict=True))
+    return rows, columns
 
 
 def _by_usefulness(names: list[str]) -> list[str]:
@@ -379,21 +275,6 @@ def _by_usefulness(names: list[str]) -> list[str]:
     return sorted(
         names, key=lambda name: (name != "torrance-sparrow", MODELS[name].lobes == 0, order.index(name))
     )
-
-
-def _spread(direction: NDArray[np.float64], count: int | None) -> list[int]:
-    """Return which `count` directions lie furthest apart, each the furthest from those before, in order."""
-    total = len(direction)
-    if count is None or count >= total:
-        return list(range(total))
-    if count <= 0:
-        return []
-    chosen = [int(np.argmax(direction[:, 2]))]
-    nearest = direction @ direction[chosen[0]]
-    while len(chosen) < count:
-        chosen.append(int(np.argmin(nearest)))
-        nearest = np.maximum(nearest, direction @ direction[chosen[-1]])
-    return sorted(chosen)
 
 
 def _display(stack: Stack) -> dict[str, Any]:
@@ -410,12 +291,22 @@ def _display(stack: Stack) -> dict[str, Any]:
     }
 
 
-def _gloss_tables(fit: Fit) -> list[dict[str, Any]]:
-    """Return, per angle, gloss units per unit of albedo and of each lobe over the shape parameters."""
-    spec = parse_model(fit.attributes["model"])
-    tables = []
-    for meter in GLOSSMETERS:
-        table = PixelGloss(spec, fit.attributes, meter)
-        axes = [{"low": float(axis[0]), "high": float(axis[-1]), "count": len(axis)} for axis in table.axes]
-        tables.append({"angle_deg": meter.angle_deg, "axes": axes, "values": table.grid.ravel().tolist()})
-    return tables
+def _gloss_tables(fit: Fit, base: str) -> list[dict[str, Any]]:
+    """Return the table of gloss units that the page draws from; none for a model with too many parameters."""
+    if len(parse_model(base).shape) > _GLOSS_AXES:
+        return []
+    return [_gloss_table(base, fit.attributes["index_of_refraction"], fit.attributes["fresnel"])]
+
+
+@cache
+def _gloss_table(base: str, index: float, fresnel: str) -> dict[str, Any]:
+    """Return gloss units per unit of albedo and of each lobe, over the shape parameters of a model."""
+    table = PixelGloss(
+        parse_model(base), {"index_of_refraction": index, "fresnel": fresnel}, GLOSSMETERS[_GLOSS_METER]
+    )
+    axes = [{"low": float(axis[0]), "high": float(axis[-1]), "count": len(axis)} for axis in table.axes]
+    return {
+        "angle_deg": GLOSSMETERS[_GLOSS_METER].angle_deg,
+        "axes": axes,
+        "values": [float(f"{value:.6g}") for value in table.grid.ravel().tolist()],
+    }

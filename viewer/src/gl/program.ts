@@ -2,6 +2,7 @@
 
 export class Program {
   readonly #locations = new Map<string, WebGLUniformLocation | null>();
+  #linked = false;
   readonly handle: WebGLProgram;
 
   constructor(
@@ -21,16 +22,25 @@ export class Program {
       gl.deleteShader(shader);
     }
     gl.linkProgram(program);
-    if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
-      const shaders = gl.getAttachedShaders(program) ?? [];
-      const log = shaders.map((shader) => gl.getShaderInfoLog(shader)).join("\n");
-      throw new Error(`the shader does not compile: ${gl.getProgramInfoLog(program)}\n${log}`);
-    }
     this.handle = program;
   }
 
+  /** Whether it can be used without waiting for its compiler, as far as the browser tells. */
+  get ready(): boolean {
+    const parallel = this.gl.getExtension("KHR_parallel_shader_compile");
+    if (this.#linked || !parallel) return true;
+    return this.gl.getProgramParameter(this.handle, parallel.COMPLETION_STATUS_KHR) as boolean;
+  }
+
   use(): void {
-    this.gl.useProgram(this.handle);
+    const { gl, handle } = this;
+    if (!this.#linked && !gl.getProgramParameter(handle, gl.LINK_STATUS) && !gl.isContextLost()) {
+      const shaders = gl.getAttachedShaders(handle) ?? [];
+      const log = shaders.map((shader) => gl.getShaderInfoLog(shader)).join("\n");
+      throw new Error(`the shader does not compile: ${gl.getProgramInfoLog(handle)}\n${log}`);
+    }
+    this.#linked = true;
+    gl.useProgram(handle);
   }
 
   /** Where a uniform lies; null where the program does not use it, which WebGL takes in silence. */

@@ -1,7 +1,7 @@
 /** What a frame shows. Lengths in mm, angles in radians, in the painting's frame (docs/notation.md). */
 
-import type { ModelEntry } from "../store/published";
-import type { Mode } from "./shaders";
+import type { ModelEntry } from "../store/attributes";
+import type { Mode } from "./model-shader";
 
 export interface View {
   /** Pixel of the picture in the middle of the canvas; 0 is the left or top edge. */
@@ -22,11 +22,19 @@ export interface ShaderLight {
 export interface Range {
   readonly low: number;
   readonly high: number;
-  readonly logarithmic: boolean;
+  /** `diverging` runs from −high to high, with a colour of its own for 0. */
+  readonly scale: "linear" | "logarithmic" | "diverging";
 }
 
 export type Content =
-  | { readonly kind: "model"; readonly model: ModelEntry; readonly mode: Mode; readonly range: Range }
+  | {
+      readonly kind: "model";
+      readonly model: ModelEntry;
+      readonly mode: Mode;
+      readonly range: Range;
+      /** Whether to add what the model leaves over, where the store has it. */
+      readonly residual: boolean;
+    }
   | {
       readonly kind: "column";
       readonly model: ModelEntry;

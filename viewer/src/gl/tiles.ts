@@ -1,7 +1,7 @@
 /** Tiles on the graphics card: loaded on demand, nearest first, cancelled when no longer wanted, bounded in memory. */
 
 import { isAbort, type StoreProblem } from "../store/errors";
-import type { Layer, PublishedStore } from "../store/published";
+import type { Codes, Layer, PublishedStore } from "../store/published";
 import { nearest } from "./program";
 
 /** Browsers open no more connections to a host by HTTP/1.1. */
@@ -31,12 +31,12 @@ export function keyOf({ layer, level, row, column }: TileKey): string {
 }
 
 export function blocksOf(layer: Layer): number {
-  return Math.ceil(layer.columns.length / 4);
+  return Math.ceil(layer.depth / 4);
 }
 
 /** Bytes of one tile on the graphics card. */
 export function bytesOf(layer: Layer): number {
-  return layer.chunk * layer.chunk * blocksOf(layer) * 8;
+  return layer.chunk * layer.chunk * blocksOf(layer) * 4 * layer.bytes;
 }
 
 export class Tiles {
@@ -47,7 +47,7 @@ export class Tiles {
   #frame = 0;
   #bytes = 0;
   /** Called when a tile has come. */
-  onload: (tile: Tile, codes: Uint16Array) => void = () => {};
+  onload: (tile: Tile) => void = () => {};
   onproblem: (problem: StoreProblem) => void = () => {};
 
   constructor(
@@ -124,7 +124,7 @@ export class Tiles {
       this.#bytes += tile.bytes;
       this.#evict();
       this.#loading.delete(name);
-      this.onload(tile, codes);
+      this.onload(tile);
     } catch (error) {
       if (controller.signal.aborted || isAbort(error)) return;
       this.#failed.set(name, performance.now());
@@ -135,16 +135,18 @@ export class Tiles {
     }
   }
 
-  #upload(key: TileKey, codes: Uint16Array): Tile {
+  #upload(key: TileKey, codes: Codes): Tile {
     const { gl } = this;
     const { layer } = key;
     const blocks = blocksOf(layer);
     const texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA16UI, layer.chunk * blocks, layer.chunk);
-    const data = padded(codes, layer.columns.length, blocks);
     const size = [layer.chunk * blocks, layer.chunk] as const;
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, ...size, gl.RGBA_INTEGER, gl.UNSIGNED_SHORT, data);
+    const [format, type] =
+      layer.bytes === 1 ? [gl.RGBA8UI, gl.UNSIGNED_BYTE] : [gl.RGBA16UI, gl.UNSIGNED_SHORT];
+    gl.texStorage2D(gl.TEXTURE_2D, 1, format, ...size);
+    const data = padded(codes, layer.depth, blocks);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, ...size, gl.RGBA_INTEGER, type, data);
     nearest(gl);
     const [height, width] = this.store.size(key.level);
     return {
@@ -171,14 +173,15 @@ export class Tiles {
   }
 }
 
-/** Returns codes with `columns` per pixel as `blocks` groups of four, the rest of the last group 0. */
-export function padded(codes: Uint16Array, columns: number, blocks: number): Uint16Array {
+/** Returns codes with `depth` per pixel as `blocks` groups of four, the rest of the last group 0. */
+export function padded(codes: Codes, depth: number, blocks: number): Codes {
   const stride = 4 * blocks;
-  if (stride === columns) return codes;
-  const pixels = codes.length / columns;
-  const result = new Uint16Array(pixels * stride);
-  for (let pixel = 0, from = 0, to = 0; pixel < pixels; pixel++, to += stride - columns) {
-    for (let i = 0; i < columns; i++) result[to++] = codes[from++]!;
+  if (stride === depth) return codes;
+  const pixels = codes.length / depth;
+  const result: Codes =
+    codes instanceof Uint8Array ? new Uint8Array(pixels * stride) : new Uint16Array(pixels * stride);
+  for (let pixel = 0, from = 0, to = 0; pixel < pixels; pixel++, to += stride - depth) {
+    for (let i = 0; i < depth; i++) result[to++] = codes[from++]!;
   }
   return result;
 }

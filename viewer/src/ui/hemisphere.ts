@@ -8,15 +8,16 @@ const RADIUS = 46;
 const STEP_DEG = 2;
 const LARGEST_ZENITH = 89;
 
-/** Distance from the middle is the sine of the zenith angle, as the hemisphere looks from above. */
+/** A place on a hemisphere of radius 1 as it looks from above: the sine of the zenith angle away from its middle. */
 export function toPlace(zenith: number, azimuth: number): [number, number] {
-  const radius = RADIUS * Math.sin((zenith * Math.PI) / 180);
+  const radius = Math.sin((zenith * Math.PI) / 180);
   const angle = (azimuth * Math.PI) / 180;
   return [radius * Math.cos(angle), -radius * Math.sin(angle)];
 }
 
+/** The inverse of `toPlace`. */
 export function fromPlace(x: number, y: number): { zenith: number; azimuth: number } {
-  const radius = Math.min(Math.hypot(x, y) / RADIUS, 1);
+  const radius = Math.min(Math.hypot(x, y), 1);
   return {
     zenith: Math.min((Math.asin(radius) * 180) / Math.PI, LARGEST_ZENITH),
     azimuth: (Math.atan2(-y, x) * 180) / Math.PI,
@@ -32,6 +33,11 @@ export function ontoArm(zenith: number, azimuth: number): { zenith: number; azim
 /** Signed angle on the arm. */
 export function armAngle({ zenith, azimuth }: Pick<Light, "zenith" | "azimuth">): number {
   return Math.abs(azimuth) > 90 ? -zenith : zenith;
+}
+
+function drawnAt({ zenith, azimuth }: Light): [number, number] {
+  const [x, y] = toPlace(zenith, azimuth);
+  return [RADIUS * x, RADIUS * y];
 }
 
 export class Hemisphere {
@@ -72,7 +78,7 @@ export class Hemisphere {
       this.element.setPointerCapture(event.pointerId);
       const [x, y] = this.#place(event);
       const near = this.#lights.findIndex((light) => {
-        const [lx, ly] = toPlace(light.zenith, light.azimuth);
+        const [lx, ly] = drawnAt(light);
         return Math.hypot(lx - x, ly - y) < 7;
       });
       if (near >= 0 && near !== this.#active) this.choose(near);
@@ -91,7 +97,7 @@ export class Hemisphere {
     this.element.classList.toggle("on-arm", arm);
     this.#dots.replaceChildren(
       ...lights.map((light, index) => {
-        const [cx, cy] = toPlace(light.zenith, light.azimuth);
+        const [cx, cy] = drawnAt(light);
         return svg("circle", { cx, cy, r: 5, class: index === active ? "light active" : "light" });
       }),
     );
@@ -113,7 +119,7 @@ export class Hemisphere {
   }
 
   #move(x: number, y: number): void {
-    const { zenith, azimuth } = fromPlace(x, this.#arm ? 0 : y);
+    const { zenith, azimuth } = fromPlace(x / RADIUS, this.#arm ? 0 : y / RADIUS);
     this.change(zenith, azimuth);
   }
 

@@ -1,8 +1,10 @@
 /** A pixel's parameters, and its radiance under a light that moves in the plane of the present one. */
 
 import { evaluateBasis } from "../gl/basis";
+import { residualBasis, withResidual } from "../gl/residual";
 import { findModel } from "../models";
-import type { Layer, ModelEntry, PublishedStore } from "../store/published";
+import type { ModelEntry } from "../store/attributes";
+import type { Codes, Layer, PublishedStore } from "../store/published";
 import { curvePlot, type Line } from "./curve";
 import { h } from "./dom";
 import type { Messages } from "./i18n";
@@ -21,6 +23,12 @@ export interface PixelValue {
   readonly component: number;
   readonly value: number;
   readonly units: string;
+}
+
+interface CurvePoint {
+  readonly angle: number;
+  readonly light: Vector;
+  readonly radiance: readonly number[];
 }
 
 export class Inspector {
@@ -46,11 +54,11 @@ export class Inspector {
     }));
   }
 
-  async #codes(layer: Layer, x: number, y: number): Promise<Uint16Array> {
-    const { chunk, columns } = layer;
+  async #codes(layer: Layer, x: number, y: number): Promise<Codes> {
+    const { chunk, depth } = layer;
     const codes = await this.store.chunk(layer, 0, Math.floor(y / chunk), Math.floor(x / chunk));
-    const at = ((y % chunk) * chunk + (x % chunk)) * columns.length;
-    return codes.slice(at, at + columns.length);
+    const at = ((y % chunk) * chunk + (x % chunk)) * depth;
+    return codes.slice(at, at + depth);
   }
 
   /** The panel for a pixel; `models` are those shown, `azimuth` the plane of the light. */
@@ -61,7 +69,11 @@ export class Inspector {
     for (const model of models) {
       const parameters = await this.values(model, "parameters", x, y);
       const quality = await this.values(model, "quality", x, y);
-      lines.push({ label: model.title, points: this.#curve(model, parameters, x, y, azimuth), dots: false });
+      const curve = this.#curve(model, parameters, x, y, azimuth);
+      lines.push({ label: model.title, points: brightness(curve), dots: false });
+      const added = await this.#withResidual(model, curve, x, y);
+      if (added)
+        lines.push({ label: messages.withResidual(model.title), points: brightness(added), dots: false });
       tables.push(this.#table(model, parameters, quality));
     }
     const plot = h("div");
@@ -107,8 +119,8 @@ export class Inspector {
     return h("table", {}, h("caption", {}, model.title), h("tbody", {}, ...rows));
   }
 
-  /** Luminance of the radiance over angles of the light, by the shader's own basis. */
-  #curve(model: ModelEntry, values: PixelValue[], x: number, y: number, azimuth: number): [number, number][] {
+  /** Radiance over angles of the light, by the shader's own basis. */
+  #curve(model: ModelEntry, values: PixelValue[], x: number, y: number, azimuth: number): CurvePoint[] {
     const pick = (name: string) => values.filter((value) => value.name === name).map((value) => value.value);
     const [nx, ny] = pick("normal") as [number, number];
     if (!Number.isFinite(nx + ny)) return [];
@@ -126,12 +138,34 @@ export class Inspector {
     const cases = sweep.map((angle) => ({ normal, view, shape, light: direction(angle, azimuth) }));
     const optics = { index: model.index_of_refraction, element: model.fresnel === "element" };
     const basis = evaluateBasis(this.gl, given, optics, cases);
-    const diffuse = luminance(pick("diffuse"));
-    const ambient = pick("ambient").length ? luminance(pick("ambient")) : 0;
-    const colour = luminance(model.light_rgb);
+    const [diffuse, ambient] = [pick("diffuse"), pick("ambient")];
     return basis.map(([d, ...lobes], i) => {
       const highlight = lobes.reduce((sum, lobe, j) => sum + lobe * (specular[j] ?? 0), 0);
-      return [sweep[i]!, diffuse * d! + ambient + colour * highlight];
+      const radiance = model.light_rgb.map(
+        (colour, c) => diffuse[c]! * d! + (ambient[c] ?? 0) + colour * highlight,
+      );
+      return { angle: sweep[i]!, light: cases[i]!.light, radiance };
+    });
+  }
+
+  /** The same with what the model leaves over, null where the store does not have that. */
+  async #withResidual(
+    model: ModelEntry,
+    curve: CurvePoint[],
+    x: number,
+    y: number,
+  ): Promise<CurvePoint[] | null> {
+    const layer = this.store.residual(model);
+    if (!layer) return null;
+    const { table, toe } = model.residual!;
+    const coefficients = Array.from(await this.#codes(layer, x, y), (code) => table[code]!);
+    return curve.map((point) => {
+      const basis = residualBasis(model.residual!, point.light);
+      const radiance = point.radiance.map((value, c) => {
+        const added = coefficients.reduce((sum, coefficient, k) => sum + coefficient * basis[k]![c]!, 0);
+        return withResidual(value, added, toe);
+      });
+      return { ...point, radiance };
     });
   }
 
@@ -167,6 +201,10 @@ export class Inspector {
     await Promise.all(Array.from({ length: AT_ONCE }, work));
     return points.filter(([, value]) => Number.isFinite(value)).sort(([a], [b]) => a - b);
   }
+}
+
+function brightness(curve: readonly CurvePoint[]): [number, number][] {
+  return curve.map(({ angle, radiance }) => [angle, luminance(radiance)]);
 }
 
 /** The signed angle of a light in the plane of an azimuth, null where it stands too far out of it. */

@@ -9,18 +9,19 @@ const TICKS = 5;
 export function legend(title: string, units: string, range: Range): HTMLElement {
   const ticks = Array.from({ length: TICKS }, (_, i) => {
     const share = i / (TICKS - 1);
-    const value = range.logarithmic
-      ? range.low * (range.high / range.low) ** share
-      : range.low + (range.high - range.low) * share;
+    const value =
+      range.scale === "logarithmic"
+        ? range.low * (range.high / range.low) ** share
+        : range.low + (range.high - range.low) * share;
     return h("span", {}, format(value));
   });
   const bar = h("div", { class: "bar" });
-  bar.style.background = cssGradient();
+  bar.style.background = cssGradient(range.scale === "diverging");
   const unit = units && units !== "1" ? ` (${units})` : "";
   return h(
     "figure",
     { class: "legend" },
-    h("figcaption", {}, `${title}${unit}${range.logarithmic ? " · log" : ""}`),
+    h("figcaption", {}, `${title}${unit}${range.scale === "logarithmic" ? " · log" : ""}`),
     bar,
     h("div", { class: "ticks" }, ...ticks),
   );

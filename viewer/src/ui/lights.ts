@@ -1,7 +1,7 @@
 /** From the lights that a person sets to those that the shader takes. */
 
+import { MAX_LIGHTS } from "../gl/model-shader";
 import type { ShaderLight } from "../gl/scene";
-import { MAX_LIGHTS } from "../gl/shaders";
 import { DAYLIGHT, type Light } from "./state";
 
 export type Vector = [number, number, number];

@@ -1,8 +1,10 @@
 /** The maps that can be shown, and the range of their colours. */
 
+import { MODES, type Mode } from "../gl/model-shader";
+import { residualBasis } from "../gl/residual";
 import type { Content, Range } from "../gl/scene";
-import { MODES, type Mode } from "../gl/shaders";
-import type { Column, ModelEntry, PublishedStore } from "../store/published";
+import type { Column, ModelEntry, ResidualTerm } from "../store/attributes";
+import type { PublishedStore } from "../store/published";
 import type { Messages } from "./i18n";
 
 export interface Choice {
@@ -18,6 +20,7 @@ export function basicChoices(store: PublishedStore, model: ModelEntry, messages:
   if (model.lobes === 0) modes.splice(1, 1);
   if (model.lobes > 0) modes.push("ratio");
   if (model.gloss.some((table) => table.angle_deg === 60 && table.axes.length <= 2)) modes.push("gloss");
+  if (model.residual) modes.push("residual");
   const choices = modes.map((mode) => ({ value: mode as string, label: messages[mode] }));
   if (store.heights()) choices.push({ value: "height", label: messages.height });
   return choices;
@@ -52,12 +55,22 @@ export function columnLabel(
 }
 
 /** What a choice of the list shows, with the range of its colours; falls back to the painting under the light. */
-export function contentOf(show: string, model: ModelEntry, store: PublishedStore, range: Range): Content {
-  if (show in MODES) return { kind: "model", model, mode: show as Mode, range };
+export function contentOf(
+  show: string,
+  model: ModelEntry,
+  store: PublishedStore,
+  range: Range,
+  withResidual: boolean,
+): Content {
+  const lit = (mode: Mode): Content => {
+    const residual = mode === "residual" || (mode === "radiance" && withResidual);
+    return { kind: "model", model, mode, range, residual };
+  };
+  if (show in MODES) return lit(show as Mode);
   if (show === "height" && store.heights()) return { kind: "column", model, of: "height", column: 0, range };
   const found = findColumn(show, model);
   if (found) return { kind: "column", model, of: found.of, column: found.index, range };
-  return { kind: "model", model, mode: "radiance", range };
+  return lit("radiance");
 }
 
 export function findColumn(
@@ -72,7 +85,7 @@ export function findColumn(
 
 /** Whether what is shown has a colour bar. */
 export function hasLegend(show: string, model: ModelEntry): boolean {
-  return show === "ratio" || show === "gloss" || show === "height" || findColumn(show, model) !== null;
+  return ["ratio", "gloss", "height", "residual"].includes(show) || findColumn(show, model) !== null;
 }
 
 export function decode(column: Column, code: number): number {
@@ -82,19 +95,22 @@ export function decode(column: Column, code: number): number {
   return code === 1 ? 0 : 2 ** linear;
 }
 
-const UNKNOWN: Range = { low: 0, high: 1, logarithmic: false };
+/** Pixels whose residual tells the range of colours. */
+const SAMPLED = 20_000;
+const UNKNOWN: Range = { low: 0, high: 1, scale: "linear" };
 
 /** Returns a range for colours from the coarsest level: the middle 96 per cent, logarithmic where it spans decades. */
 export async function findRange(show: string, model: ModelEntry, store: PublishedStore): Promise<Range> {
-  if (show === "gloss") return { low: 1, high: 100, logarithmic: true };
-  if (show === "quality:status:0") return { low: 0, high: 5, logarithmic: false };
+  if (show === "gloss") return { low: 1, high: 100, scale: "logarithmic" };
+  if (show === "quality:status:0") return { low: 0, high: 5, scale: "linear" };
   if (!hasLegend(show, model)) return UNKNOWN;
+  if (show === "residual") return residualRange(model, store);
   const values = (await coarseValues(show, model, store)).filter(Number.isFinite).sort((a, b) => a - b);
   if (values.length === 0) return UNKNOWN;
   const at = (share: number) => values[Math.round(share * (values.length - 1))]!;
   const [low, high] = [at(0.02), at(0.98)];
-  if (low > 0 && high / low > 30) return { low: Math.max(low, high / 1e5), high, logarithmic: true };
-  return { low, high: high > low ? high : low + Math.abs(low) * 0.01 + 1e-6, logarithmic: false };
+  if (low > 0 && high / low > 30) return { low: Math.max(low, high / 1e5), high, scale: "logarithmic" };
+  return { low, high: high > low ? high : low + Math.abs(low) * 0.01 + 1e-6, scale: "linear" };
 }
 
 async function coarseValues(show: string, model: ModelEntry, store: PublishedStore): Promise<number[]> {
@@ -114,4 +130,45 @@ async function coarseValues(show: string, model: ModelEntry, store: PublishedSto
   const specular = columns.findIndex((column) => column.name === "specular");
   const diffuse = columns.findIndex((column) => column.name === "diffuse");
   return pixels.map((pixel) => pick(pixel, specular) / pick(pixel, diffuse));
+}
+
+/** A range for what the residual term adds, the same for all lights: the 98th percentile over pixels of twice its mean. */
+async function residualRange(model: ModelEntry, store: PublishedStore): Promise<Range> {
+  const layers = [store.layer(model, "parameters"), store.residual(model)!];
+  const level = layers[0]!.levels[layers[0]!.levels.length - 1]!;
+  const [codes, packed] = await Promise.all(layers.map((layer) => store.chunk(layer, level, 0, 0)));
+  const { components, table, toe } = model.residual!;
+  const { parameters } = model;
+  const diffuse = parameters.findIndex((column) => column.name === "diffuse");
+  const gram = meanProducts(model.residual!);
+  const added: number[] = [];
+  const count = packed!.length / components;
+  for (let pixel = 0; pixel < count; pixel += Math.ceil(count / SAMPLED)) {
+    const albedo = decode(parameters[diffuse]!, codes![pixel * parameters.length + diffuse]!);
+    if (Number.isNaN(albedo)) continue;
+    const coefficient = Array.from(
+      packed!.subarray(pixel * components, (pixel + 1) * components),
+      (c) => table[c]!,
+    );
+    let square = 0;
+    for (let j = 0; j < components; j++) {
+      for (let k = 0; k < components; k++) square += coefficient[j]! * coefficient[k]! * gram[j]![k]!;
+    }
+    // (√(Y + a) + v)² − (Y + a), to first order in v.
+    added.push(2 * Math.sqrt((albedo + toe) * Math.max(square, 0)));
+  }
+  added.sort((a, b) => a - b);
+  const high = 2 * (added[Math.round(0.98 * (added.length - 1))] ?? 0) + 1e-4;
+  return { low: -high, high, scale: "diverging" };
+}
+
+/** Mean over the fitted lights of the products of any two components, in the first channel. */
+function meanProducts(term: ResidualTerm): number[][] {
+  const bases = term.direction.map((light) => residualBasis(term, light).map((channels) => channels[0]!));
+  return Array.from({ length: term.components }, (_, j) =>
+    Array.from(
+      { length: term.components },
+      (_, k) => bases.reduce((sum, basis) => sum + basis[j]! * basis[k]!, 0) / bases.length,
+    ),
+  );
 }

@@ -80,9 +80,19 @@ export class Panel {
       }
       show.value = state.show;
     });
+    const add = h("input", {
+      type: "checkbox",
+      onchange: () => this.actions.change({ residual: add.checked }),
+    });
+    const residual = h("label", { class: "check" }, add, m.addResidual);
+    this.#refreshers.push((state) => {
+      add.checked = state.residual;
+      residual.hidden = !models.find(({ name }) => name === state.model)?.residual;
+    });
     return [
       model,
       labelled(m.show, show),
+      residual,
       this.#slider(
         m.exposure,
         -5,
@@ -226,6 +236,7 @@ export class Panel {
       { value: "", label: m.nothing },
       ...models.map(({ name }) => ({ value: `model:${name}`, label: m.withModel(name) })),
     ];
+    if (models.some((model) => model.residual)) choices.push({ value: "alone", label: m.modelAlone });
     if (photographs) {
       choices.push({ value: "photograph:nearest", label: m.nearestPhotograph });
       choices.push(

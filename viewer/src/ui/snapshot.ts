@@ -2,6 +2,18 @@
 
 const SIGNATURE = 8;
 
+/** Returns what a canvas shows, just drawn, as a PNG file; `profile` is an ICC profile in base64. */
+export async function saved(canvas: HTMLCanvasElement, profile?: string): Promise<Blob> {
+  const png = await new Promise<Blob>((resolve, reject) =>
+    canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("no picture"))), "image/png"),
+  );
+  if (!profile) return png;
+  return withProfile(
+    png,
+    Uint8Array.from(atob(profile), (c) => c.charCodeAt(0)),
+  );
+}
+
 /** Returns a PNG file with an ICC profile in it, in place of whatever the browser said about colours. */
 export async function withProfile(png: Blob, profile: Uint8Array): Promise<Blob> {
   const bytes = new Uint8Array(await png.arrayBuffer());

@@ -1,7 +1,7 @@
 /** What the person at the page has chosen, and the same as the part of an address behind `#`. */
 
+import { MODES } from "../gl/model-shader";
 import type { View } from "../gl/scene";
-import { MODES } from "../gl/shaders";
 
 export interface Light {
   /** Degrees from the painting's normal, and around it from the right towards the top. */
@@ -19,7 +19,9 @@ export interface State {
   readonly model: string;
   /** A mode of the shader, or `parameters:c:0`, `quality:residual_rms:0`, `height`. */
   readonly show: string;
-  /** `model:NAME`, `photograph:nearest`, `photograph:NUMBER`, or nothing. */
+  /** Whether to add what the model leaves over, where the store has it. */
+  readonly residual: boolean;
+  /** `model:NAME`, `alone` (the same model without its residual), `photograph:nearest`, `photograph:NUMBER`, or nothing. */
   readonly compare: string;
   readonly split: "swipe" | "side";
   readonly swipe: number;
@@ -51,6 +53,7 @@ export function initialState(model: string): State {
   return {
     model,
     show: "radiance",
+    residual: true,
     compare: "",
     split: "swipe",
     swipe: 0.5,
@@ -82,6 +85,7 @@ export function toHash(state: State): string {
     ["show", state.show],
     ["light", lights.join(";")],
   ];
+  if (!state.residual) parts.push(["residual", "0"]);
   if (state.compare) parts.push(["compare", state.compare], ["split", state.split]);
   if (state.compare && state.split === "swipe") parts.push(["swipe", round(state.swipe, 3)]);
   if (state.active) parts.push(["active", String(state.active)]);
@@ -116,6 +120,7 @@ export function fromHash(hash: string, state: State): State {
   return {
     model: given.get("model") ?? state.model,
     show: isShow(given.get("show")) ? given.get("show")! : state.show,
+    residual: given.get("residual") !== "0",
     compare: given.has("model") || given.has("compare") ? (given.get("compare") ?? "") : state.compare,
     split: split === "side" || split === "swipe" ? split : state.split,
     swipe: number("swipe", 0, 1, state.swipe),
