@@ -53,7 +53,7 @@ class Light(Protocol):
         """Switch all lamps off, as far as they can be; errors as for `show`."""
 
     def close(self) -> None:
-        """Let go of the device; never raises."""
+        """Let go of the device, and leave it dark if it can be; asks nobody and never raises."""
 
 
 class Camera(Protocol):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -149,6 +148,7 @@ class _Run:
     notes: list[str] = field(default_factory=list)
     _subject: str | None = None
     _lit: str | None = None
+    _redo: set[str] = field(default_factory=set)
     _coverage: Coverage | None = None
 
     def __post_init__(self) -> None:
@@ -179,7 +179,7 @@ class _Run:
             if self.desk.answers_itself is not None:
                 raise_problems(CaptureError, self.trouble)
         finally:
-            show_progress(self.desk, self.shots, self.folder.kept, None)
+            self._show_progress(None)
         return RunSummary(
             folder=self.folder.path,
             photographs=len(self.shots),
@@ -198,10 +198,8 @@ class _Run:
         )
 
     def close(self) -> None:
-        """Leave the stand dark and let go of the devices, whatever state they are in."""
+        """Let go of the devices, whatever state they are in."""
         if self.stand.light is not None:
-            with suppress(Exception):
-                self.stand.light.off()
             self.stand.light.close()
         if self.camera is not None:
             self.camera.close()
@@ -226,7 +224,7 @@ class _Run:
     def _take(self, shot: Shot) -> None:
         """Take a photograph until it is good or kept as it is."""
         while True:
-            show_progress(self.desk, self.shots, self.folder.kept, shot)
+            self._show_progress(shot)
             try:
                 self._prepare(shot)
                 arrived = self._open_camera().take(shot, self.folder.incoming)
@@ -278,6 +276,7 @@ class _Run:
                 return False
         self.folder.add(shot, arrived, kept_with=[f"{each.check}: {each.what}" for each in findings])
         self.judge.accept(shot, look)
+        self._redo.discard(shot.name)
         self.say(f"{shot.name}: {shot.label}" + ", kept as it is" * bool(findings))
         if shot.painting and shot.last:
             self._show_coverage()
@@ -321,6 +320,7 @@ class _Run:
             if shot.name in self.folder.kept and (same or shot.name == name):
                 self.folder.put_aside(shot.name, reason)
                 self.judge.forget(shot.name)
+                self._redo.add(shot.name)
                 self.again += 1
         self._lit = None  # the lamp is shown anew
 
@@ -348,6 +348,9 @@ class _Run:
         from impasto.stand.plan_text import photograph_lines
 
         return photograph_lines(self.stand.plan.file.photographs)
+
+    def _show_progress(self, now: Shot | None) -> None:
+        show_progress(self.desk, self.shots, self.folder.kept, now, self._redo)
 
     def _show_coverage(self) -> None:
         found = self.judge.coverage()

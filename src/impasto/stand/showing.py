@@ -17,8 +17,10 @@ _QUALITY = 85
 _CLIPPED_RGBA = (255, 0, 60, 190)
 
 
-def show_progress(desk: Desk, shots: Sequence[Shot], kept: Collection[str], now: Shot | None) -> None:
-    """Show what is done, what is being done and what comes next."""
+def show_progress(
+    desk: Desk, shots: Sequence[Shot], kept: Collection[str], now: Shot | None, again: Collection[str]
+) -> None:
+    """Show what is done, what is being done, what comes next and what is to be taken again."""
     left = [shot for shot in shots if shot.name not in kept]
     after = [shot for shot in left if now is None or shot.name != now.name]
     desk.show(
@@ -26,6 +28,7 @@ def show_progress(desk: Desk, shots: Sequence[Shot], kept: Collection[str], now:
         done=len(shots) - len(left),
         now=None if now is None else {"name": now.name, "label": now.label},
         next=[{"name": shot.name, "label": shot.label} for shot in after[:4]],
+        again=[f"{shot.name}: {shot.label}" for shot in left if shot.name in again],
     )
 
 

@@ -21,12 +21,16 @@ _FINE, _COARSE = (0.8, 1.6), (2.5, 5.0)
 # The frame is compared in so many fields a side; a highlight that wanders blunts some of them, a blur all.
 _FIELDS = 6
 _QUANTILE = 0.7
+# Steep relief and a gloss that comes and goes change the detail more than a blur does.
+_LEAST_REFERENCES, _MOST_SPREAD = 3, 1.25
 
 Band = NDArray[np.float64]
 
 
-def sharpness(look: Look, references: Sequence[Look]) -> float:
+def sharpness(look: Look, references: Sequence[Look]) -> float | None:
     """Return how much fine detail a photograph has for its coarse detail, against others; 1 for as much.
+
+    None where nobody can tell, because the others are fewer than three, or differ too much among themselves.
 
     Parameters
     ----------
@@ -42,6 +46,8 @@ def sharpness(look: Look, references: Sequence[Look]) -> float:
     those taken before it: originals have 0.97 or more, those blurred by a Gaussian of 1 px at most 0.83, of
     2 px 0.55.
     """
+    if len(references) < _LEAST_REFERENCES:
+        return None
     own, theirs = [], []
     for number in range(len(look.parts)):
         bands = [_bands(other, number) for other in references]
@@ -51,13 +57,16 @@ def sharpness(look: Look, references: Sequence[Look]) -> float:
         own.append(_fields(_bands(look, number), weights) / usual)
         theirs.append(fields / usual)
     sharpest = np.quantile(np.concatenate(own), _QUANTILE)
-    least = np.quantile(np.concatenate(theirs, axis=1), _QUANTILE, axis=1).min()
-    return float(sharpest / min(1.0, least))
+    others = np.quantile(np.concatenate(theirs, axis=1), _QUANTILE, axis=1)
+    if others.max() > _MOST_SPREAD * others.min():
+        return None
+    return float(sharpest / min(1.0, others.min()))
 
 
 def blurred(look: Look, shot: Shot, references: Sequence[Look], limits: Limits) -> list[Finding]:
     """Return whether a photograph is less sharp than those under lamps near its own."""
-    if not references or (found := sharpness(look, references)) >= 1 - limits.blur:
+    found = sharpness(look, references)
+    if found is None or found >= 1 - limits.blur:
         return []
     least = f"at least {1 - limits.blur:.0%} planned"
     what = f"has {found:.0%} of the fine detail of photographs under lamps near its own, {least}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import subprocess
+from contextlib import suppress
 from typing import Any
 
 from pydantic import Field
@@ -51,7 +52,9 @@ class CommandLight:
             self._run(shlex.split(self._settings.off))
 
     def close(self) -> None:
-        """Do nothing: each command has ended."""
+        """Switch the lamps off."""
+        with suppress(DriverError):
+            self.off()
 
     def _run(self, command: list[str]) -> None:
         where = " ".join(command)

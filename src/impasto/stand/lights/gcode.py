@@ -108,8 +108,10 @@ class GCodeLight:
                 self._command(self._settings.lamp_off)
 
     def close(self) -> None:
-        """Let go of the line."""
-        with suppress(Exception):
+        """Switch the lamp off, if the arm can, and let go of the line."""
+        with suppress(DriverError, self._serial.SerialException, OSError):
+            self.off()
+        with suppress(self._serial.SerialException, OSError):
             self._line.close()
 
     def _greet(self) -> None:

@@ -5,7 +5,7 @@ const CHANNELS = ["#d66", "#6b6", "#69d"];
 const GREY = "#ccc";
 const RETRY_MS = 1000;
 // Somewhat longer than the program lets a question for news rest.
-const PATIENCE_MS = 15000;
+const PATIENCE_MS = 8000;
 
 const element = (id) => document.getElementById(id);
 let shown = {};
@@ -42,6 +42,8 @@ function show(state) {
   const again = state.again ?? [];
   element("again-part").hidden = !again.length;
   list("again", again);
+  element("waiting").hidden = !state.waiting;
+  element("waiting").textContent = state.waiting ?? "";
   showPhotograph(state);
   showQuestion(state.question);
   const coverage = state.coverage;
@@ -67,7 +69,7 @@ function showPhotograph(state) {
   }
   element("caption").textContent = `${seen.name}: ${seen.label}`;
   element("shares").textContent =
-    `${percent(seen.clipped)} clipped (marked red); a twentieth reaches ${percent(seen.bright)} of full scale`;
+    `clipped, marked red: ${percent(seen.clipped)} · brightest twentieth: ${(100 * seen.bright).toFixed(0)} %`;
   list("findings", state.question?.problem ? [] : seen.findings.map((finding) => finding.what));
   drawHistogram(seen.histogram);
 }
@@ -129,7 +131,8 @@ function list(id, texts) {
 }
 
 function percent(share) {
-  return share > 0 && share < 0.0001 ? "under 0.01 %" : `${(100 * share).toFixed(2)} %`;
+  if (share === 0) return "0 %";
+  return share < 0.0001 ? "under 0.01 %" : `${(100 * share).toFixed(2)} %`;
 }
 
 // A foot pedal is a keyboard with one of these keys.
@@ -138,6 +141,10 @@ document.addEventListener("keydown", (event) => {
   if (event.target instanceof HTMLButtonElement && event.key !== "PageDown") return;
   event.preventDefault();
   document.querySelector("#choices button.first")?.click();
+});
+// The tablet knows at once that it has no network; that the program is out of reach shows with the next question.
+addEventListener("offline", () => {
+  element("lost").hidden = false;
 });
 element("stop").addEventListener("click", () => fetch("stop", { method: "POST" }));
 follow();

@@ -20,7 +20,7 @@ from impasto.stand.desk import Desk
 _HERE = Path(__file__).parent
 _FILES = {"": "page.html", "page.js": "page.js", "page.css": "page.css"}
 # A page that has heard nothing for so long asks again, so that it notices a lost connection.
-_WAIT_S = 10.0
+_WAIT_S = 5.0
 _TYPES = {"photograph.jpg": "image/jpeg", "clipped.png": "image/png"}
 _HEADERS = {
     "Cache-Control": "no-store",
@@ -59,7 +59,7 @@ def serve_page(desk: Desk, host: str = "127.0.0.1", port: int = 0) -> Iterator[s
     token = secrets.token_urlsafe(16)
     config = uvicorn.Config(
         make_app(desk, token),
-        log_level="warning",
+        log_level="critical",  # a page that still waits when the run ends is no fault
         access_log=False,
         server_header=False,
         timeout_graceful_shutdown=1,
