@@ -6,16 +6,15 @@ from impasto.stand.drivers import open_camera as plan_camera
 from impasto.stand.drivers import open_light as plan_light
 from impasto.stand.plan_file import read_plan
 
-ARM = range(-44, 45, 8)
-"""Twelve angles: the fewest of which an exchange of lamps is looked for, and some more."""
+ARM = range(-40, 41, 10)
+"""Nine angles, one more than an exchange of lamps is looked for in."""
 
 
-def write_plan(
-    folder, *, sample="b", size=(96, 64), arm=ARM, times=(2, 0.25, 0.03125), replace=(), **options
-):
+def write_plan(folder, *, sample="b", size=(96, 64), arm=ARM, times=(2, 0.125), replace=(), **options):
     """Write a plan of a simulated stand and return its path; `replace` holds pairs of texts."""
     path = folder / "plan.toml"
-    stand.plan(path, arm_deg=arm, times_s=times, **{"camera": "simulated", "light": "simulated"} | options)
+    drivers = {"camera": "simulated", "light": "simulated", "calibration": ("dark", "ambient")}
+    stand.plan(path, arm_deg=arm, times_s=times, **drivers | options)
     text = path.read_text()
     pairs = [
         ("size = [192, 128]", f'size = {list(size)}\nsample = "{sample}"'),

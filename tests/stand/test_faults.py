@@ -80,11 +80,11 @@ def cut_off(path):
 
 # The photograph that goes wrong, what happens to its file, and the check and words that name it.
 FILE_FAULTS = {
-    "clipped": ("brackets/2/arm+004", altered(lambda image: image * 400), "at full scale"),
-    "moved": ("arm+004", altered(lambda image: shift(image, (2, -1, 0), order=0, mode="nearest")), "px off"),
-    "blurred": ("arm+004", altered(lambda image: gaussian_filter(image, (2, 2, 0))), "fine detail"),
-    "duplicate": ("arm+004", copy_of_an_earlier, "same file"),
-    "truncated": ("arm+004", cut_off, "damaged|cut off|truncated|cannot be read|incomplete"),
+    "clipped": ("brackets/1/arm+010", altered(lambda image: image * 400), "at full scale"),
+    "moved": ("arm+010", altered(lambda image: shift(image, (2, -1, 0), order=0, mode="nearest")), "px off"),
+    "blurred": ("arm+010", altered(lambda image: gaussian_filter(image, (2, 2, 0))), "fine detail"),
+    "duplicate": ("arm+010", copy_of_an_earlier, "same file"),
+    "truncated": ("arm+010", cut_off, "damaged|cut off|truncated|cannot be read|incomplete"),
 }
 
 
@@ -115,9 +115,9 @@ def test_what_stays_wrong_is_no_capture(clean, tmp_path):
     photos = tmp_path / "photos"
 
     def fault(shot, path, times):
-        return FILE_FAULTS["blurred"][1](path) if shot.name == "arm+004" else path
+        return FILE_FAULTS["blurred"][1](path) if shot.name == "arm+010" else path
 
-    with pytest.raises(CaptureError, match=r"arm\+004: blurred"):
+    with pytest.raises(CaptureError, match=r"arm\+010: blurred"):
         stand.run(clean[0], photos, open_camera=faulty_camera(fault), say=quiet)
     with pytest.raises(CaptureError, match="no light file"):
         impasto.stack(photos, tmp_path / "store.zarr")
@@ -127,29 +127,29 @@ def test_what_stays_wrong_is_no_capture(clean, tmp_path):
 
 def test_a_lamp_that_does_not_fire_is_named(clean, tmp_path):
     said = []
-    open_light = faulty_light(lambda name, times: None if name == "arm+004" and times == 0 else name)
+    open_light = faulty_light(lambda name, times: None if name == "arm+010" and times == 0 else name)
     photos = tmp_path / "photos"
     summary = stand.run(clean[0], photos, open_light=open_light, say=said.append)
     assert summary.complete
-    assert any(line.startswith("arm+004") and "did not fire" in line for line in said)
+    assert any(line.startswith("arm+010") and "did not fire" in line for line in said)
     is_right(photos, clean, tmp_path)
 
 
 def test_exchanged_lamps_are_named_and_taken_again(clean, tmp_path):
-    exchanged = {"arm-028": "arm+028", "arm+028": "arm-028"}
+    exchanged = {"arm-030": "arm+030", "arm+030": "arm-030"}
     said = []
     open_light = faulty_light(lambda name, times: exchanged.get(name, name) if times == 0 else name)
     photos = tmp_path / "photos"
     summary = stand.run(clean[0], photos, open_light=open_light, say=said.append)
     assert summary.complete
-    assert any("arm-028" in line and "arm+028" in line and "exchanged" in line for line in said)
-    assert summary.again == 6  # both, with their shorter exposures
+    assert any("arm-030" in line and "arm+030" in line and "exchanged" in line for line in said)
+    assert summary.again == 4  # both, with their shorter exposures
     is_right(photos, clean, tmp_path)
 
 
 def test_a_camera_that_is_gone_is_named_and_the_run_goes_on(clean, tmp_path):
     def gone(shot, path, times):
-        if shot.name == "arm+004" and times == 0:
+        if shot.name == "arm+010" and times == 0:
             path.unlink()
             raise DriverError(Problem("camera", "does not answer", "See to its cable"))
         return path
@@ -159,12 +159,12 @@ def test_a_camera_that_is_gone_is_named_and_the_run_goes_on(clean, tmp_path):
     summary = stand.run(clean[0], photos, open_camera=faulty_camera(gone), say=said.append)
     assert summary.complete
     assert any("does not answer" in line for line in said)
-    assert entries(photos, "failure")[0]["name"] == "arm+004"
+    assert entries(photos, "failure")[0]["name"] == "arm+010"
     is_right(photos, clean, tmp_path)
 
 
 def test_a_full_disk_is_named_and_the_same_command_goes_on(clean, tmp_path, monkeypatch):
-    """The disk is full from the 20th photograph on; with room again, nothing is missing and nothing twice."""
+    """The disk is full from the 13th photograph on; with room again, nothing is missing and nothing twice."""
     photos = tmp_path / "photos"
     written = 0
     append = journals.Journal._append
@@ -172,7 +172,7 @@ def test_a_full_disk_is_named_and_the_same_command_goes_on(clean, tmp_path, monk
     def full(self, data):
         nonlocal written
         written += b'"photograph"' in data
-        if written >= 20:
+        if written >= 13:
             self._file.write(data[:10])  # a part of the line gets there
             self._file.flush()
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -186,7 +186,7 @@ def test_a_full_disk_is_named_and_the_same_command_goes_on(clean, tmp_path, monk
         impasto.stack(photos, tmp_path / "store.zarr")
     summary = stand.run(clean[0], photos, say=quiet)
     assert summary.complete
-    assert summary.before == 19
+    assert summary.before == 12
     is_right(photos, clean, tmp_path)
 
 
@@ -194,7 +194,7 @@ def test_a_run_that_is_killed_goes_on_where_it_was(clean, tmp_path):
     """Kill -9, twice, at moments that nobody chose."""
     photos = tmp_path / "photos"
     script = f"from impasto import stand; stand.run({str(clean[0])!r}, {str(photos)!r})"
-    for least in (5, 15):
+    for least in (4, 11):
         process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.DEVNULL)
         path = photos / "record" / "journal.jsonl"
         while process.poll() is None and (
@@ -208,7 +208,7 @@ def test_a_run_that_is_killed_goes_on_where_it_was(clean, tmp_path):
     summary = stand.run(clean[0], photos, say=quiet)
     assert summary.complete
     assert summary.before + summary.taken >= summary.photographs
-    assert before >= 15
+    assert before >= 11
     is_right(photos, clean, tmp_path)
 
 
@@ -229,7 +229,7 @@ def test_a_crash_while_files_are_moved_loses_none(crash, clean, tmp_path, monkey
         return whole(self, *arguments, **about)
 
     def fault(shot, path, times):
-        spoiled = crash == "_aside" and shot.name == "arm+004" and times == 0
+        spoiled = crash == "_aside" and shot.name == "arm+010" and times == 0
         return FILE_FAULTS["blurred"][1](path) if spoiled else path
 
     with monkeypatch.context() as patch:
@@ -246,7 +246,7 @@ def test_a_clock_that_is_set_is_named_and_changes_nothing(clean, tmp_path, monke
 
     def fault(shot, path, times):
         nonlocal jump
-        if shot.name == "arm+004":
+        if shot.name == "arm+010":
             jump = -3600.0
         return path
 
@@ -263,7 +263,7 @@ def test_a_second_run_into_the_same_folder_is_refused(clean, tmp_path):
     photos = tmp_path / "photos"
 
     def fault(shot, path, times):
-        if shot.name == "arm+004" and times == 0:
+        if shot.name == "arm+010" and times == 0:
             with pytest.raises(CaptureError, match="another process is capturing into it"):
                 stand.run(clean[0], photos, say=quiet)
         return path
@@ -276,11 +276,11 @@ def test_a_photograph_that_was_changed_afterwards_is_noticed_before_the_capture_
 
     def fault(shot, path, times):
         if shot.kind == "ambient" and "after" in shot.name and times == 0:
-            with (photos / "arm+004.tif").open("ab") as file:
+            with (photos / "arm+010.tif").open("ab") as file:
                 file.write(b"more")
         return path
 
-    with pytest.raises(CaptureError, match=r"arm\+004: are missing or not as they were taken"):
+    with pytest.raises(CaptureError, match=r"arm\+010: are missing or not as they were taken"):
         stand.run(clean[0], photos, open_camera=faulty_camera(fault), say=quiet)
     assert not (photos / "capture.toml").exists()
     assert stand.run(clean[0], photos, say=quiet).taken == 1

@@ -5,7 +5,7 @@ import time
 
 import pytest
 from grbl import Grbl, Marlin
-from stands import quiet, stand_of, write_plan
+from stands import ARM, quiet, stand_of, write_plan
 
 from impasto import stand
 from impasto.stand.desk import Desk
@@ -153,4 +153,4 @@ def test_a_capture_with_an_arm_sees_where_the_lamp_is(arm, tmp_path):
     )  # fmt: skip
     assert stand.run(plan, tmp_path / "photos", say=quiet).complete
     moves = [line for line in arm.lines if line.startswith("G90")]
-    assert moves == [f"G90 G1 X{angle:.3f} F1200" for angle in range(-44, 45, 8)]
+    assert moves == [f"G90 G1 X{angle:.3f} F1200" for angle in ARM]

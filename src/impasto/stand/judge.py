@@ -140,7 +140,7 @@ class Judge:
         next_longer = max(longer, key=lambda seen: seen.shot.bracket)
         return [
             *exposure.exposure_ratio(look, shot, next_longer.look, next_longer.shot),
-            *movement.moved(movement.shift_px(look, [next_longer.look]), shot, self.limits),
+            *movement.moved(movement.shift_px(look, [next_longer.look]), shot, self.limits, next_longer.shot),
         ]
 
     def _longest(self) -> Iterable[Seen]:

@@ -166,11 +166,11 @@ class _Run:
         before = len(self.folder.kept)
         stopped = False
         try:
-            while missing := [shot for shot in self.shots if shot.name not in self.folder.kept]:
-                for shot in missing:
-                    self.desk.check_stop()
-                    self._take(shot)
-                self._look_at_all()
+            while shot := self._missing():
+                self.desk.check_stop()
+                self._take(shot)
+                if self._missing() is None:
+                    self._look_at_all()
             self._finish()
         except StoppedError:
             stopped = True
@@ -221,20 +221,21 @@ class _Run:
                 self.judge.accept(by_name[name], look)
         self.folder.journal.write("run", photographs=len(self.folder.kept))
 
+    def _missing(self) -> Shot | None:
+        """Return the first photograph that is not there."""
+        return next((shot for shot in self.shots if shot.name not in self.folder.kept), None)
+
     def _take(self, shot: Shot) -> None:
-        """Take a photograph until it is good or kept as it is."""
-        while True:
-            self._show_progress(shot)
-            try:
-                self._prepare(shot)
-                arrived = self._open_camera().take(shot, self.folder.incoming)
-            except DriverError as error:
-                self._failed(shot, error)
-                continue
-            self.taken += 1
-            if self._accept(shot, arrived):
-                return
-            self.again += 1
+        """Take a photograph; it is missing still if camera or light fail, or it has to be taken again."""
+        self._show_progress(shot)
+        try:
+            self._prepare(shot)
+            arrived = self._open_camera().take(shot, self.folder.incoming)
+        except DriverError as error:
+            self._failed(shot, error)
+            return
+        self.taken += 1
+        self._accept(shot, arrived)
 
     def _prepare(self, shot: Shot) -> None:
         """Have the subject before the camera and the lamp where it belongs."""
@@ -251,7 +252,7 @@ class _Run:
             time.sleep(self.stand.plan.file.light.settle_s)
         self._subject, self._lit = subject, shot.place
 
-    def _accept(self, shot: Shot, arrived: Path) -> bool:
+    def _accept(self, shot: Shot, arrived: Path) -> None:
         """Check a file; take it in if it is good or wanted as it is, and set it aside otherwise."""
         try:
             look = self._look(arrived)
@@ -271,16 +272,19 @@ class _Run:
             self.folder.journal.write("finding", name=shot.name, findings=[str(each) for each in findings])
             if self._decide(findings, choices) == _AGAIN:
                 self.folder.refuse(arrived, shot.name, "; ".join(finding.what for finding in findings))
+                self.again += 1
                 if any(finding.check == "light" for finding in findings):
                     self._lit = None  # a lamp that did not fire is told again
-                return False
+                for finding in findings:
+                    for name in set(finding.photographs) & set(self.folder.kept):
+                        self._set_aside(name, finding.what)
+                return
         self.folder.add(shot, arrived, kept_with=[f"{each.check}: {each.what}" for each in findings])
         self.judge.accept(shot, look)
         self._redo.discard(shot.name)
         self.say(f"{shot.name}: {shot.label}" + ", kept as it is" * bool(findings))
         if shot.painting and shot.last:
             self._show_coverage()
-        return True
 
     def _copies(self, shot: Shot, arrived: Path) -> list[Finding]:
         """Return whether a file is one that was taken before, set aside or not."""

@@ -58,16 +58,30 @@ def shift_px(look: Look, references: Sequence[Look]) -> tuple[float, float] | No
     return float(columns), float(rows)
 
 
-def moved(shift: tuple[float, float] | None, shot: Shot, limits: Limits) -> list[Finding]:
-    """Return whether a photograph lies off others, by what `shift_px` returned."""
+def moved(
+    shift: tuple[float, float] | None, shot: Shot, limits: Limits, other: Shot | None = None
+) -> list[Finding]:
+    """Return whether a photograph lies off others.
+
+    Parameters
+    ----------
+    shift : (float, float) or None
+        What `shift_px` returned.
+    shot : Shot
+    limits : Limits
+    other : Shot, optional
+        The only one that it was compared with: nobody can tell which of the two moved.
+    """
     if shift is None or np.hypot(*shift) <= limits.moved_px:
         return []
+    off = "the photographs under lamps near its own" if other is None else other.name
     what = (
-        f"lies {np.hypot(*shift):.2f} px off the others ({shift[0]:+.2f} columns, "
-        f"{shift[1]:+.2f} rows); at most {limits.moved_px:g} px planned"
+        f"lies {np.hypot(*shift):.2f} px off {off} ({shift[0]:+.2f} columns, {shift[1]:+.2f} rows); at most "
+        f"{limits.moved_px:g} px planned"
     )
     do = "Wait until nothing shakes and take it again; if it stays off, camera or painting has moved for good"
-    return [Finding("moved", (shot.name,), what, do)]
+    names = (shot.name,) if other is None else (other.name, shot.name)
+    return [Finding("moved", names, what, do)]
 
 
 @lru_cache(maxsize=60)
