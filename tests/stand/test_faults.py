@@ -110,6 +110,21 @@ def test_a_photograph_that_went_wrong_is_named_and_taken_again(name, clean, tmp_
     is_right(photos, clean, tmp_path)
 
 
+def test_of_two_exposures_that_lie_apart_both_are_taken_again(clean, tmp_path):
+    """Which of them moved, nobody can tell from the two."""
+    said = []
+
+    def fault(shot, path, times):
+        return FILE_FAULTS["moved"][1](path) if shot.name == "brackets/1/arm+010" and times == 0 else path
+
+    photos = tmp_path / "photos"
+    summary = stand.run(clean[0], photos, open_camera=faulty_camera(fault), say=said.append)
+    assert summary.complete
+    assert summary.again == 2
+    assert any("arm+010, brackets/1/arm+010: lies 2.24 px off arm+010" in line for line in said), said
+    is_right(photos, clean, tmp_path)
+
+
 def test_what_stays_wrong_is_no_capture(clean, tmp_path):
     """Where nobody attends and three tries fail, there is an error, and nothing that `stack` would read."""
     photos = tmp_path / "photos"

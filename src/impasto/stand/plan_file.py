@@ -50,7 +50,6 @@ class CameraPlan(CameraTable):
 
     driver: str
     transfer_s: NotNegative = 2.0
-    settings: dict[str, Any] = Field(default_factory=dict)
 
 
 class LightPlan(Table):
@@ -59,7 +58,6 @@ class LightPlan(Table):
     driver: str
     settle_s: NotNegative = 1.0
     move_s: NotNegative = 5.0
-    settings: dict[str, Any] = Field(default_factory=dict)
 
 
 class Limits(Table):
@@ -232,12 +230,13 @@ def _take_settings(
     driver = entry.get("driver") if isinstance(entry, dict) else None
     if not isinstance(entry, dict) or not isinstance(driver, str):
         return None  # pydantic says so
-    where = f"{name} [{table}]"
-    if driver not in drivers:
-        problems.append(Problem(where, f"there is no driver {driver!r}", f"Choose from {', '.join(drivers)}"))
-        return None
     given = entry.get(driver, {})
-    content[table] = {key: value for key, value in entry.items() if key != driver}
+    # What other drivers would want may stay in the plan.
+    content[table] = {key: value for key, value in entry.items() if key not in drivers and key != driver}
+    if driver not in drivers:
+        do = f"Choose from {', '.join(drivers)}"
+        problems.append(Problem(f"{name} [{table}]", f"there is no driver {driver!r}", do))
+        return None
     model = settings_of(drivers, driver)
     try:
         return model.model_validate(given)

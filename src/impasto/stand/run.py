@@ -407,8 +407,8 @@ class _Run:
 
 def _room(plan: Plan, out: Path) -> list[Problem]:
     """Return a problem if the disk cannot hold the photographs that are planned."""
-    missing = len(shots(plan)) - sum(1 for _ in out.rglob("*")) if out.exists() else len(shots(plan))
-    needed = max(0, missing) * plan.file.exposure.photograph_mb * 1e6
+    there = [shot for shot in shots(plan) if any((out / shot.name).parent.glob(f"{Path(shot.name).name}.*"))]
+    needed = (len(shots(plan)) - len(there)) * plan.file.exposure.photograph_mb * 1e6
     free = free_bytes(out)
     if needed <= free:
         return []

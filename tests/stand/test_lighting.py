@@ -1,0 +1,79 @@
+"""The room's light, lamps that are on by mistake, and what the photographs say of the highlights."""
+
+import pytest
+from stands import faulty_camera, quiet, write_plan
+
+from impasto import stand
+from impasto.errors import CaptureError
+from impasto.stand.drivers import open_camera
+
+
+def test_a_room_that_is_not_dark_is_named(tmp_path):
+    """A twentieth of a lamp's light comes from the room; limits say a hundredth."""
+    path = write_plan(tmp_path, times=(1,), replace=[("ambient = 0.001", "ambient = 0.05")])
+    with pytest.raises(CaptureError, match=r"ambient: the room gives [3-7]\.\d% of the light of a lamp"):
+        stand.run(path, tmp_path / "photos", say=quiet)
+    assert not (tmp_path / "photos" / "capture.toml").exists()
+
+
+def test_light_that_comes_on_during_the_capture_is_named_at_its_end(tmp_path):
+    """Somebody opens the door: it was dark before, and is not in the last photograph."""
+    cameras = []
+
+    def opened(made):
+        cameras.append(open_camera(made))
+        return cameras[-1]
+
+    path = write_plan(tmp_path, times=(1,))
+
+    def say(line):
+        if line.startswith("arm+040: painting"):
+            cameras[-1]._settings.ambient = 0.1
+
+    with pytest.raises(CaptureError, match="ambient-after: ambient: the room gives"):
+        stand.run(path, tmp_path / "photos", open_camera=opened, say=say)
+
+
+def test_a_second_lamp_is_named(tmp_path):
+    """All lamps of a dome at once are far brighter than one."""
+    from test_faults import altered
+
+    def fault(shot, path, times):
+        brighter = shot.name == "arm+010" and times == 0
+        return altered(lambda image: image * 8)(path) if brighter else path
+
+    said = []
+    path = write_plan(tmp_path, times=(0.25,), calibration=())
+    assert stand.run(path, tmp_path / "p", open_camera=faulty_camera(fault), say=said.append).complete
+    assert any("times as bright as lamps near it" in line for line in said)
+
+
+def test_a_cap_that_is_forgotten_is_named(tmp_path):
+    from test_faults import altered
+
+    def fault(shot, path, times):
+        uncapped = shot.kind == "dark" and times == 0
+        return altered(lambda image: image + 9000)(path) if uncapped else path
+
+    said = []
+    path = write_plan(tmp_path, arm=(0, 10), times=(0.25,))
+    assert stand.run(path, tmp_path / "p", open_camera=faulty_camera(fault), say=said.append).complete
+    assert any("dark frame reads 13.7% of full scale" in line for line in said)
+
+
+def test_few_lights_leave_narrow_highlights_uncovered_and_many_cover_them(tmp_path):
+    """A glossy sample under lamps 12° and 4° apart, fitted coarsely."""
+    found = {}
+    for step in (12, 4):
+        folder = tmp_path / str(step)
+        folder.mkdir()
+        path = write_plan(
+            folder, sample="e", arm=range(-60, 61, step), times=(1, 0.0625), calibration=(),
+            # From lamp to lamp this sample changes its look more than a blur would.
+            replace=[("blur = 0.15", "blur = 0.9")],
+        )  # fmt: skip
+        found[step] = stand.run(path, folder / "photos", say=quiet).coverage
+    assert found[12].gap_deg > found[4].gap_deg
+    assert found[12].gap_deg == pytest.approx(12, abs=1.5)
+    assert not found[12].enough
+    assert found[4].enough
