@@ -125,11 +125,9 @@ class Judge:
         near = self._near(shot)
         shift = movement.shift_px(look, near) if near else None
         self.shift_px[shot.name] = shift or (math.nan, math.nan)
-        if shift is None:  # it shows other edges than those: their detail says nothing of its own
-            return []
         return [
             *movement.moved(shift, shot, self.limits),
-            *sharpness.blurred(look, shot, near, self.limits),
+            *sharpness.blurred(look, shot, near, self.limits, alike=shift is not None),
         ]
 
     def _against_longer(self, shot: Shot, look: Look) -> list[Finding]:

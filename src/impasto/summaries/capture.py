@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from impasto.stand.plan import CapturePlanSummary
     from impasto.stand.run import RunSummary
 
+# A painting's normals do not tilt so far that highlights as broad as this fall between its lamps.
+_NO_PAINTING_DEG = 90.0
+
 
 def plan_lines(summary: CapturePlanSummary) -> Iterator[str]:
     """Yield what `stand.plan` planned."""
@@ -64,6 +67,9 @@ def _coverage_lines(coverage: Coverage | None) -> Iterator[str]:
     if coverage is None:
         return
     narrow, gap = coverage.narrowest_deg, coverage.gap_deg
+    if gap > _NO_PAINTING_DEG:
+        yield "highlights, by a coarse fit: much of the surface faces no lamp's mirror direction"
+        return
     verdict = "are covered" if coverage.enough else "may fall between the lamps"
     yield (
         f"highlights, by a coarse fit: the narrowest are {narrow:.1f}° wide, those below {gap:.1f}° meet no "

@@ -23,6 +23,8 @@ _FIELDS = 6
 _QUANTILE = 0.7
 # Steep relief and a gloss that comes and goes change the detail more than a blur does.
 _LEAST_REFERENCES, _MOST_SPREAD = 3, 1.25
+# A blur of two pixels and more leaves no more than this share of the detail, whatever the light is.
+_STRONGLY = 0.5
 
 Band = NDArray[np.float64]
 
@@ -63,10 +65,21 @@ def sharpness(look: Look, references: Sequence[Look]) -> float | None:
     return float(sharpest / min(1.0, others.min()))
 
 
-def blurred(look: Look, shot: Shot, references: Sequence[Look], limits: Limits) -> list[Finding]:
-    """Return whether a photograph is less sharp than those under lamps near its own."""
+def blurred(
+    look: Look, shot: Shot, references: Sequence[Look], limits: Limits, *, alike: bool
+) -> list[Finding]:
+    """Return whether a photograph is less sharp than those under lamps near its own.
+
+    Parameters
+    ----------
+    look, shot
+    references : sequence of Look
+    limits : Limits
+    alike : bool
+        Whether it shows the edges that they show; if it does not, only a strong blur can be told.
+    """
     found = sharpness(look, references)
-    if found is None or found >= 1 - limits.blur:
+    if found is None or found >= (1 - limits.blur if alike else _STRONGLY):
         return []
     least = f"at least {1 - limits.blur:.0%} planned"
     what = f"has {found:.0%} of the fine detail of photographs under lamps near its own, {least}"
