@@ -1,6 +1,6 @@
 """Checks of photographs: faults put into real photographs are found, and nothing in the originals."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ from impasto import stand
 from impasto.calibrate.shots import read_shot
 from impasto.capture import read_capture
 from impasto.images import write_png
+from impasto.stand.checks.exposure import as_planned
 from impasto.stand.checks.movement import shift_px
 from impasto.stand.checks.order import exchanged
 from impasto.stand.checks.spheres import dusty, faults, highlight
@@ -20,7 +21,7 @@ from impasto.stand.plan_file import Limits
 from impasto.stand.steps import Shot
 
 # Every so many photographs of a series get each fault: all of them would take minutes.
-SERIES = {"icon": ("icon", None, 12), "cat": ("cat/Objects", "cat/light_directions.txt", 4)}
+SERIES = {"icon": ("icon", None, 18), "cat": ("cat/Objects", "cat/light_directions.txt", 4)}
 
 
 @dataclass
@@ -110,6 +111,22 @@ def test_clipping_and_movement_of_a_real_capture_are_reported(shared):
     assert np.nanmax(np.hypot(*found.shift_px.T)) < 0.3
     assert {finding.check for finding in found.findings} == {"clipped"}
     assert found.coverage.lights == 72
+
+
+def test_an_exposure_that_the_camera_says_was_another_is_named(tmp_path):
+    """A shutter set by hand: 1/60 s where 1/8 s was planned, and 1/6 s."""
+    write_png(tmp_path / "seen.png", np.full((16, 16, 3), 99, np.uint8), None)
+    look = look_at(tmp_path / "seen.png")
+    shot = Shot("arm", "painting", "arm", 1 / 8, 0, True)
+
+    def noted(seconds):
+        return replace(look, photograph=replace(look.photograph, exposure_s=seconds))
+
+    assert as_planned(look, shot) == []  # the file does not say
+    assert as_planned(noted(0.125), shot) == as_planned(noted(0.13), shot) == []
+    (finding,) = as_planned(noted(1 / 60), shot)
+    assert "exposed for 1/60 s by its EXIF data, planned are 1/8 s" in finding.what
+    assert as_planned(noted(1 / 6), shot)
 
 
 def test_what_cannot_be_told_is_not_told(tmp_path):

@@ -91,25 +91,30 @@ def check(
         for name, group in zip(capture.lights.names, groups, strict=True)
         for number, exposure in enumerate(group)
     ]
-    looks: dict[Shot, Look] = {}
+    longest: dict[Shot, Look] = {}
+    findings: list[Finding] = []
     broken: list[Problem] = []
     with progress("Checking photographs", len(taken), show=show_progress) as advance:
         for shot, photograph in taken:
             try:
-                looks[shot] = look_at(photograph.path, photograph.transfer, capture.clip_level).thinned()
+                look = look_at(photograph.path, photograph.transfer, capture.clip_level)
             except CaptureError as error:
                 broken += error.problems
+            else:
+                if shot.bracket:
+                    findings += judge.judge(shot, look)
+                else:
+                    longest[shot] = look.thinned()
+                judge.accept(shot, look)
             advance(1)
     raise_problems(CaptureError, broken)
-    for shot, look in looks.items():
-        judge.accept(shot, look)
-    findings = [finding for shot, look in looks.items() for finding in judge.judge(shot, look)]
-    longest = [shot for shot in looks if shot.bracket == 0]
+    # Now that all are known, each is compared with those under the lamps nearest to its own.
+    findings += [finding for shot, look in longest.items() for finding in judge.judge(shot, look)]
     return CheckedCapture(
         folder=Path(folder),
         photographs=len(taken),
         names=tuple(shot.name for shot in longest),
-        clipped=np.array([looks[shot].clipped for shot in longest]),
+        clipped=np.array([look.clipped for look in longest.values()]),
         shift_px=np.array([judge.shift_px.get(shot.name, (np.nan, np.nan)) for shot in longest]),
         findings=(*findings, *judge.order(), *_dust(Path(folder))),
         coverage=judge.coverage(),

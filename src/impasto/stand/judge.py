@@ -76,7 +76,12 @@ class Judge:
         """Remember a photograph."""
         self._digests[look.pixels_sha256] = shot.name
         if shot.kind in ("painting", "ambient"):
-            self._seen[shot.name] = Seen(shot, look.thinned())
+            self._seen[shot.name] = Seen(shot, look.thinned(parts=shot.painting))
+        if shot.painting and shot.last:
+            # Parts are large, and those of shorter exposures serve only the next shorter one.
+            for seen in self._at(shot):
+                if seen.shot.bracket:
+                    self._seen[seen.shot.name] = Seen(seen.shot, seen.look.thinned(parts=False))
 
     def forget(self, name: str) -> None:
         """Forget a photograph that is to be taken again."""
@@ -131,15 +136,20 @@ class Judge:
         ]
 
     def _against_longer(self, shot: Shot, look: Look) -> list[Finding]:
-        same = [seen for seen in self._seen.values() if seen.shot.painting and seen.shot.place == shot.place]
-        longer = [seen for seen in same if seen.shot.bracket < shot.bracket]
+        longer = [seen for seen in self._at(shot) if seen.shot.bracket < shot.bracket]
         if not longer:
             return []
-        next_longer = max(longer, key=lambda seen: seen.shot.bracket)
-        return [
-            *exposure.exposure_ratio(look, shot, next_longer.look, next_longer.shot),
-            *movement.moved(movement.shift_px(look, [next_longer.look]), shot, self.limits, next_longer.shot),
-        ]
+        nearest = max(longer, key=lambda seen: seen.shot.bracket)
+        findings = exposure.exposure_ratio(look, shot, nearest.look, nearest.shot)
+        if detailed := [seen for seen in longer if seen.look.parts]:
+            other = max(detailed, key=lambda seen: seen.shot.bracket)
+            shift = movement.shift_px(look, [other.look])
+            findings += movement.moved(shift, shot, self.limits, other.shot)
+        return findings
+
+    def _at(self, shot: Shot) -> list[Seen]:
+        """Return the photographs of the painting under the lamp of a shot."""
+        return [seen for seen in self._seen.values() if seen.shot.painting and seen.shot.place == shot.place]
 
     def _longest(self) -> Iterable[Seen]:
         return (seen for seen in self._seen.values() if seen.shot.painting and not seen.shot.bracket)

@@ -72,9 +72,11 @@ class Look:
         mean[lost.reshape(rows, step, columns, step).any(axis=(1, 3))] = np.inf
         return mean
 
-    def thinned(self) -> Look:
-        """Return what later photographs are compared with, without what only this one's page shows."""
-        return replace(self, reduced=self.small, reduced_clipped=~np.isfinite(self.small[..., 0]))
+    def thinned(self, *, parts: bool = True) -> Look:
+        """Return what later photographs are compared with: a small picture, and if wanted the parts."""
+        small = self.small
+        thin = replace(self, reduced=small, reduced_clipped=~np.isfinite(small[..., 0]))
+        return thin if parts else replace(thin, parts=(), parts_clipped=())
 
 
 def look_at(path: Path, transfer: str | None = None, clip_level: float | None = None) -> Look:

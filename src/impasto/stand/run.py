@@ -9,9 +9,10 @@ from os import PathLike
 from pathlib import Path
 
 from impasto.errors import CaptureError, ImpastoError, Problem, raise_problems
-from impasto.output import prepare_folder
+from impasto.output import output_error, prepare_folder
 from impasto.stand.checks import spheres
 from impasto.stand.checks.coverage import Coverage
+from impasto.stand.checks.exposure import as_planned
 from impasto.stand.checks.finding import Finding
 from impasto.stand.desk import Desk, Question, StoppedError
 from impasto.stand.drivers import Camera, DriverError, Light, Stand, open_camera, open_light
@@ -234,6 +235,8 @@ class _Run:
         except DriverError as error:
             self._failed(shot, error)
             return
+        except OSError as error:
+            raise output_error(self.folder.incoming, error.strerror or str(error)) from error
         self.taken += 1
         self._accept(shot, arrived)
 
@@ -263,7 +266,8 @@ class _Run:
             ]
             choices = {_AGAIN: "take it again"}
         else:
-            findings = self._copies(shot, arrived) or self.judge.judge(shot, look)
+            findings = self._copies(shot, arrived)
+            findings = findings or [*as_planned(look, shot), *self.judge.judge(shot, look)]
             show_photograph(self.desk, shot, look, findings)
             unusable = any(finding.check == "duplicate" for finding in findings)
             choices = {_AGAIN: "take it again"} | ({} if unusable else {_KEEP: "keep it as it is"})

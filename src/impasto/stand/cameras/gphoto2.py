@@ -82,7 +82,9 @@ class GPhoto2Camera:
             finally:
                 self._desk.show(waiting=None)
             path = folder / name
-            self._camera.file_get(where, name, self._gp.GP_FILE_TYPE_NORMAL).save(str(path))
+            file = self._camera.file_get(where, name, self._gp.GP_FILE_TYPE_NORMAL)
+            # Written here and not by libgphoto2, which does not say when a disk is full.
+            path.write_bytes(file.get_data_and_size())
         return path
 
     def close(self) -> None:

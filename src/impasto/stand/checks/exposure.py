@@ -16,6 +16,8 @@ _TARGET_CLIPPED = 1e-4
 # Brackets whose ratio departs by more than this from their times: `stack` refuses them from there on.
 _RATIO = 0.12
 _FROM, _TO = 0.02, 0.8
+# Cameras have times in thirds of a stop, and round them when they write them down.
+_NOTED = 0.2
 _LEAST_BLOCKS = 30
 
 
@@ -53,6 +55,15 @@ def dark(look: Look, shot: Shot, limits: Limits) -> list[Finding]:
     )
     do = f"See that the lamp is on and the cap is off, or lengthen {shutter(shot.exposure_s)} in the plan"
     return [Finding("dark", (shot.name,), what, do)]
+
+
+def as_planned(look: Look, shot: Shot) -> list[Finding]:
+    """Return whether the camera says another exposure time than the plan, which the manifest repeats."""
+    noted = look.photograph.exposure_s
+    if not noted or 1 / (1 + _NOTED) <= noted / shot.exposure_s <= 1 + _NOTED:
+        return []
+    what = f"was exposed for {shutter(noted)} by its EXIF data, planned are {shutter(shot.exposure_s)}"
+    return [Finding("exposure", (shot.name,), what, "Set the camera to the planned time, then take it again")]
 
 
 def exposure_ratio(look: Look, shot: Shot, longer: Look, longer_shot: Shot) -> list[Finding]:
