@@ -1,6 +1,8 @@
 """The commands at the stand, as a person types them."""
 
 import json
+import subprocess
+import sys
 
 from typer.testing import CliRunner
 
@@ -64,3 +66,26 @@ def test_a_line_that_a_power_cut_left_unfinished_is_skipped(tmp_path):
     assert journal.write("run")["number"] == 2
     journal.close()
     assert [entry["number"] for entry in Journal(path).entries] == [1, 2]
+
+
+def test_a_line_that_the_disk_takes_only_in_part_leaves_nothing_behind(tmp_path):
+    """The system allows 400 bytes per file: a real refusal in the middle of a line."""
+    script = (
+        "import resource, sys\n"
+        "from impasto.errors import OutputError\n"
+        "from impasto.stand.journal import Journal\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (400, resource.RLIM_INFINITY))\n"
+        "journal = Journal(__import__('pathlib').Path(sys.argv[1]))\n"
+        "try:\n"
+        "    while True: journal.write('run')\n"
+        "except OutputError as error: print(error)\n"
+        "journal.close()\n"
+    )
+    path = tmp_path / "journal.jsonl"
+    done = subprocess.run([sys.executable, "-c", script, path], capture_output=True, text=True, check=True)
+    assert "journal.jsonl: cannot be written" in done.stdout
+    assert path.stat().st_size < 400
+    numbers = [json.loads(line)["number"] for line in path.open()]
+    assert numbers == list(range(1, len(numbers) + 1))
+    assert len(numbers) > 2
+    assert Journal(path).broken_lines == 0

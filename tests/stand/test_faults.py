@@ -164,6 +164,29 @@ def test_exchanged_lamps_are_named_and_taken_again(clean, tmp_path):
     is_right(photos, clean, tmp_path)
 
 
+def test_exchanged_lamps_are_named_even_if_the_run_was_cut_off_before_it_looked(clean, tmp_path, monkeypatch):
+    """Power fails after the last photograph: the next run has nothing to take, and looks all the same."""
+    from impasto.stand.session import Session
+
+    exchanged = {"arm-030": "arm+030", "arm+030": "arm-030"}
+    photos = tmp_path / "photos"
+
+    def cut(self):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Session, "_look_at_all", cut)
+        open_light = faulty_light(lambda name, times: exchanged.get(name, name))
+        with pytest.raises(KeyboardInterrupt):
+            stand.run(clean[0], photos, open_light=open_light, say=quiet)
+    assert not (photos / "capture.toml").exists()
+    said = []
+    summary = stand.run(clean[0], photos, say=said.append)
+    assert any("exchanged" in line for line in said)
+    assert (summary.before, summary.again) == (summary.photographs, 4)
+    is_right(photos, clean, tmp_path)
+
+
 def test_a_camera_that_is_gone_is_named_and_the_run_goes_on(clean, tmp_path):
     def gone(shot, path, times):
         if shot.name == "arm+010" and times == 0:

@@ -40,9 +40,10 @@ class Journal:
         self.entries: list[dict[str, Any]] = []
         self.broken_lines = 0
         try:
-            self._file = path.open("ab+")
+            # Without a buffer, so that nothing is left in one that a full disk did not take.
+            self._file = path.open("ab+", buffering=0)
             self._file.seek(0)
-            data = self._file.read()
+            data = self._file.readall()
             if data and not data.endswith(b"\n"):
                 self._append(b"\n")
         except OSError as error:
@@ -91,8 +92,9 @@ class Journal:
         self._file.close()
 
     def _append(self, data: bytes) -> None:
-        self._file.write(data)
-        self._file.flush()
+        left = memoryview(data)
+        while left:
+            left = left[self._file.write(left) :]
         os.fsync(self._file.fileno())
 
 
