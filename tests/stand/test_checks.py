@@ -10,6 +10,7 @@ from stands import quiet, write_plan
 from impasto import stand
 from impasto.calibrate.shots import read_shot
 from impasto.capture import read_capture
+from impasto.errors import CaptureError
 from impasto.images import write_png
 from impasto.stand.checks.exposure import as_planned
 from impasto.stand.checks.movement import shift_px
@@ -127,6 +128,14 @@ def test_an_exposure_that_the_camera_says_was_another_is_named(tmp_path):
     (finding,) = as_planned(noted(1 / 60), shot)
     assert "exposed for 1/60 s by its EXIF data, planned are 1/8 s" in finding.what
     assert as_planned(noted(1 / 6), shot)
+
+
+def test_photographs_of_nothing_are_no_copies_of_each_other(tmp_path):
+    """Two dark frames without noise are equal, and two cards that are clipped all over."""
+    plan = write_plan(tmp_path, arm=(0, 10), times=(4,), calibration=("dark", "white"))
+    plan.write_text(plan.read_text().replace("exposure = 0.5", "exposure = 50"))
+    with pytest.raises(CaptureError, match=r"calibration/white: clipped: 100\.00% of the samples"):
+        stand.run(plan, tmp_path / "photos", say=quiet)
 
 
 def test_what_cannot_be_told_is_not_told(tmp_path):

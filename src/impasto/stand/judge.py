@@ -53,7 +53,8 @@ class Judge:
 
     def judge(self, shot: Shot, look: Look) -> list[Finding]:
         """Return what is wrong with a photograph, given those that were accepted."""
-        twin = self._digests.get(look.pixels_sha256, shot.name)
+        # Uniform pictures have no digest.
+        twin = self._digests.get(look.pixels_sha256, shot.name) if look.pixels_sha256 else shot.name
         if twin != shot.name:
             what = f"has the same pixels as {twin}: the camera or its program gave a photograph twice"
             return [Finding("duplicate", (shot.name,), what, "Take it again")]

@@ -31,7 +31,8 @@ class Look:
     ----------
     photograph : Photograph
     pixels_sha256 : str
-        Digest of the decoded values, which a copy shares whatever its name and metadata are.
+        Digest of the decoded values, which a copy shares whatever its name and metadata are; "" where all
+        values are equal, as in dark frames and where everything is clipped.
     clipped : float
         Share of the samples at full scale.
     histogram : ndarray of shape (C, 64)
@@ -109,10 +110,12 @@ def look_at(path: Path, transfer: str | None = None, clip_level: float | None = 
     linear = _linear(photograph)
     digest = hashlib.sha256()
     clipped = 0
+    lowest, highest = np.inf, -np.inf
     histogram = np.zeros((channels, _BINS), np.int64)
     band_rows = max(1, _BAND_ROWS // step) * step
     for row, band in photograph.bands(band_rows):
         digest.update(np.ascontiguousarray(band).tobytes())
+        lowest, highest = min(lowest, float(band.min())), max(highest, float(band.max()))
         over = np.asarray(band >= level)
         values: NDArray[Any] = linear(band)
         clipped += int(np.count_nonzero(over))
@@ -132,7 +135,7 @@ def look_at(path: Path, transfer: str | None = None, clip_level: float | None = 
     samples = height * width * channels
     return Look(
         photograph=photograph,
-        pixels_sha256=digest.hexdigest(),
+        pixels_sha256=digest.hexdigest() if highest > lowest else "",
         clipped=clipped / samples,
         histogram=histogram / (height * width),
         reduced=reduced,

@@ -38,7 +38,9 @@ function show(state) {
     element("progress").max = state.total;
     element("progress").value = state.done;
   }
-  list("next", (state.next ?? []).map((shot) => shot.label));
+  const next = (state.next ?? []).map((shot) => shot.label);
+  element("next-part").hidden = !next.length;
+  list("next", next);
   const again = state.again ?? [];
   element("again-part").hidden = !again.length;
   list("again", again);
@@ -53,7 +55,7 @@ function show(state) {
       `${coverage.lights} lamps: narrowest ${coverage.narrowest_deg.toFixed(1)}°, ` +
       `gaps ${coverage.gap_deg.toFixed(1)}°: ${coverage.enough ? "covered" : "may fall between the lamps"}`;
   }
-  element("stop").hidden = Boolean(state.ended || state.question);
+  element("stop").hidden = Boolean(state.ended || state.question || !state.now);
   shown = state;
 }
 
