@@ -22,6 +22,12 @@ SIZE = (15_000, 20_000)
 TILE = 512
 PANNING_S = 120
 WINDOW = {"width": 1440, "height": 900}
+FIRST = """
+new Promise(resolve => {
+  const look = () => window.first ? resolve(window.first) : setTimeout(look, 20);
+  look();
+})
+"""
 VIEWER = "document.querySelector('impasto-viewer')"
 
 
@@ -42,7 +48,7 @@ def measure(folder: Path, panning_s: float = PANNING_S) -> dict[str, float]:
         before = memory_bytes()
         page.goto(url)
         complete(page, 120)
-        first = page.evaluate("window.first")
+        first = page.evaluate(FIRST)
         page.evaluate(f"{VIEWER}.hash = 'view=3000,3000,0.5'")
         x, y = WINDOW["width"] / 3, WINDOW["height"] / 2
         largest, frames, end = 0, 0, time.monotonic() + panning_s

@@ -126,6 +126,33 @@ def test_the_residual_is_added_only_where_asked_and_under_lights_that_tell_it(pu
     assert np.mean(difference > 0) < 1e-4  # rounding of the square root and back
 
 
+def test_the_residual_is_a_map_a_box_and_a_line(page, browser):
+    other = browser.new_page(viewport={"width": 900, "height": 600}, locale="en-GB")
+    other.goto(page.url.partition("#")[0] + "#model=phong")
+    complete(other)
+    viewer = "document.querySelector('impasto-viewer')"
+    assert other.get_by_label("Add what the model leaves over").is_visible()
+    other.get_by_label("Add what the model leaves over").uncheck()
+    assert other.evaluate(f"{viewer}.state.residual") is False
+    assert "residual=0" in other.evaluate(f"{viewer}.hash")
+    other.get_by_label("Show", exact=True).select_option("residual")
+    complete(other)
+    other.locator(".ticks span", has_text="-").first.wait_for()
+    ticks = [float(text) for text in other.locator(".ticks span").all_text_contents()]
+    assert ticks == [-ticks[4], -ticks[3], 0, ticks[3], ticks[4]]
+    assert ticks[4] > 0.01
+    other.get_by_label("Compare", exact=True).select_option("alone")
+    assert other.locator(".caption").all_text_contents() == ["phong", "The model alone"]
+    other.evaluate(f"{viewer}.inspect(300, 200)")
+    other.locator(".curve .line-1").wait_for()
+    curves = [other.locator(f".curve .line-{number}").get_attribute("d") for number in (0, 1)]
+    assert curves[0] != curves[1]
+    other.get_by_label("Model", exact=True).select_option("phong-no-ambient")
+    assert other.get_by_label("Add what the model leaves over").is_hidden()
+    assert other.evaluate(f"{viewer}.state.show") == "radiance"
+    other.close()
+
+
 def golden_cases():
     """Return the golden cases by model and optics."""
     groups = {}

@@ -2,19 +2,23 @@
  * The element `<impasto-viewer src="…/painting.zarr">`; docs/publish.md lists its attributes and events.
  */
 
+import type { ImpastoViewerEvents } from "./events";
 import { type BasisCase, type BasisOptics, evaluateBasis } from "./gl/basis";
 import { Renderer } from "./gl/renderer";
 import type { Scene, View } from "./gl/scene";
 import { findModel, MODELS, type Model } from "./models";
 import { asProblem, type StoreProblem } from "./store/errors";
 import { PublishedStore } from "./store/published";
+import { copyAddress } from "./ui/address";
 import { Annotations } from "./ui/annotations";
-import { download, h } from "./ui/dom";
+import { download } from "./ui/dom";
 import { attachGestures, type GestureTarget } from "./ui/gestures";
 import { fromPlace, ontoArm } from "./ui/hemisphere";
 import { messagesFor } from "./ui/i18n";
 import { Inspector } from "./ui/inspector";
+import { type KeyTarget, pressed } from "./ui/keys";
 import { Layout } from "./ui/layout";
+import { Milestones } from "./ui/milestones";
 import { NotesPanel } from "./ui/notes-panel";
 import type { Rule } from "./ui/overlay";
 import { Panel, type Tool } from "./ui/panel";
@@ -24,27 +28,17 @@ import { fromHash, initialState, type Light, type State, toHash } from "./ui/sta
 import { fitted, panned, toPage, toPicture, type Viewport, zoomed } from "./ui/viewport";
 import css from "./viewer.css?inline";
 
+export type { ImpastoViewerEvents } from "./events";
 export type { Light, State } from "./ui/state";
-
-/** Events of the element, by name, with what they tell. */
-export interface ImpastoViewerEvents {
-  /** All of the first view is drawn; `first` says when there was something to look at, if only coarse. */
-  "impasto-ready": CustomEvent<{ requests: number; milliseconds: number; first: number }>;
-  /** The view, the light or what is shown has changed. */
-  "impasto-change": CustomEvent<{ state: State; hash: string }>;
-  "impasto-problem": CustomEvent<{ kind: string; where: string; detail: string }>;
-  "impasto-pixel": CustomEvent<{ x: number; y: number }>;
-}
 
 const sheet = new CSSStyleSheet();
 sheet.replaceSync(css);
 
 const MEGABYTE = 1 << 20;
-const DEFAULT_CACHE_MB = 160;
+const DEFAULT_CACHE_MB = 96;
 const SETTLED_MS = 160;
 /** How long to leave a compiler alone: before there is anything to see, and after. */
 const COMPILE_MS = { nothing: 8, something: 100 };
-const COPIED_MS = 2500;
 
 /** Everything that there is once a store is open. */
 interface Opened {
@@ -56,7 +50,7 @@ interface Opened {
   renderer: Renderer;
 }
 
-export class ImpastoViewer extends HTMLElement implements GestureTarget {
+export class ImpastoViewer extends HTMLElement implements GestureTarget, KeyTarget {
   static readonly observedAttributes = ["src", "lang", "cache-mb"];
 
   readonly #root = this.attachShadow({ mode: "open" });
@@ -70,9 +64,7 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
   #opening: AbortController | null = null;
   #frame = 0;
   #changed = 0;
-  #ready = false;
-  #started = 0;
-  #first = 0;
+  #milestones = new Milestones();
   #resize = new ResizeObserver(() => this.#fitCanvas());
 
   /** What is shown; set it to change that. */
@@ -95,7 +87,9 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
   /** Whether all tiles of the present view are drawn. */
   get complete(): boolean {
     const renderer = this.#opened?.renderer;
-    return this.#ready && this.#frame === 0 && !renderer?.compiling && renderer?.tiles.pending === 0;
+    return (
+      this.#milestones.whole && this.#frame === 0 && !renderer?.compiling && renderer?.tiles.pending === 0
+    );
   }
 
   get store(): PublishedStore | null {
@@ -139,7 +133,7 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     this.#frame = 0;
     this.#opened?.renderer.dispose();
     this.#opened = null;
-    this.#ready = false;
+    this.#milestones = new Milestones();
   }
 
   async #open(): Promise<void> {
@@ -155,8 +149,6 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     if (!src) return;
     this.#opening = new AbortController();
     const { signal } = this.#opening;
-    this.#started = performance.now();
-    this.#first = 0;
     try {
       const opening = PublishedStore.open(new URL(src, document.baseURI), signal);
       opening.catch(() => {}); // told below
@@ -216,11 +208,11 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
       change: (change) => this.#change(change),
       light: (change) => this.#changeLight(change),
       tool: (tool) => this.#choose(tool),
-      fit: () => this.#change({ view: null }),
-      fullSize: () => this.#change({ view: { ...this.#view(), scale: 1 } }),
+      fit: () => this.showAll(),
+      fullSize: () => this.showFullSize(),
       zoom: (factor) => this.zoom(factor, ...this.#layout.middle),
       snapshot: () => void this.#saveSnapshot(),
-      bookmark: () => void this.#copyAddress(),
+      bookmark: () => void copyAddress(this.hash, this.#layout.problems),
       lightAsPhotograph: () => this.#lightAsPhotograph(),
     });
   }
@@ -280,8 +272,7 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
   }
 
   #scene(still: boolean): Scene {
-    const view = this.#view();
-    return this.#opened!.scenes.scene(this.#state, view, still && view.scale < 1);
+    return this.#opened!.scenes.scene(this.#state, this.#view(), still);
   }
 
   #draw(): void {
@@ -296,39 +287,27 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     const { renderer } = this.#opened!;
     const scene = this.#scene(performance.now() - this.#changed > SETTLED_MS);
     const complete = renderer.draw(scene);
-    this.#milestones(renderer, complete);
+    const reached = this.#milestones.frame(renderer, complete);
+    if (reached) {
+      this.#drawOverlay();
+      const { requests } = this.#opened!.store.http;
+      void reached.then((milestone) => this.#tell("impasto-ready", { requests, ...milestone }));
+    }
     if (renderer.compiling) {
       setTimeout(() => this.#draw(), renderer.drawn ? COMPILE_MS.something : COMPILE_MS.nothing);
     }
     // Once more, smoothly, when nothing has changed for a while.
-    if (!scene.smooth && scene.view.scale < 1) {
+    if (!scene.still) {
       const changed = this.#changed;
       setTimeout(() => this.#changed === changed && this.#draw(), SETTLED_MS + 10);
     }
-  }
-
-  /** Notes when the first picture, and all of it, has been drawn in fact. */
-  #milestones(renderer: Renderer, complete: boolean): void {
-    if (this.#ready || !renderer.drawn) return;
-    const drawn = renderer.finished().then(() => performance.now() - this.#started);
-    if (!this.#first) {
-      this.#first = Number.POSITIVE_INFINITY;
-      void drawn.then((milliseconds) => (this.#first = Math.min(this.#first, milliseconds)));
-    }
-    if (!complete) return;
-    this.#ready = true;
-    this.#drawOverlay();
-    const { requests } = this.#opened!.store.http;
-    void drawn.then((milliseconds) => {
-      this.#tell("impasto-ready", { requests, milliseconds, first: Math.min(this.#first, milliseconds) });
-    });
   }
 
   #drawOverlay(): void {
     if (!this.#opened) return;
     this.#layout.overlay.update(this.#opened.scenes, {
       state: this.#state,
-      loading: !this.#ready,
+      loading: !this.#milestones.whole,
       rule: this.#rule,
       notes: this.#opened.notes.annotations.list,
       toPage: (x, y) => this.toPage(x, y),
@@ -389,26 +368,16 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     } else void this.inspect(px, py);
   }
 
+  showAll(): void {
+    this.#change({ view: null });
+  }
+
+  showFullSize(): void {
+    if (this.#opened) this.#change({ view: { ...this.#view(), scale: 1 } });
+  }
+
   key(event: KeyboardEvent): void {
-    if (event.ctrlKey || event.metaKey || !this.#opened) return;
-    const step = event.shiftKey ? 200 : 50;
-    const middle = this.#layout.middle;
-    const actions: Record<string, () => void> = {
-      ArrowLeft: () => this.pan(step, 0),
-      ArrowRight: () => this.pan(-step, 0),
-      ArrowUp: () => this.pan(0, step),
-      ArrowDown: () => this.pan(0, -step),
-      "+": () => this.zoom(1.25, ...middle),
-      "=": () => this.zoom(1.25, ...middle),
-      "-": () => this.zoom(0.8, ...middle),
-      "0": () => this.#change({ view: null }),
-      "1": () => this.#change({ view: { ...this.#view(), scale: 1 } }),
-      i: () => this.tap(...middle),
-    };
-    const action = actions[event.key];
-    if (!action) return;
-    event.preventDefault();
-    action();
+    if (this.#opened) pressed(event, this, this.#layout.middle);
   }
 
   /** Moves the swipe line. */
@@ -426,20 +395,12 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
     const { scenes, inspector, store } = this.#opened!;
     const { model, compare, lights, active } = this.#state;
     const shown = [model, ...(compare.startsWith("model:") ? [compare.slice("model:".length)] : [])];
-    const { details, messages } = this.#layout;
-    details.hidden = false;
-    this.#layout.showSide(true);
-    details.replaceChildren(messages.loading);
+    this.#layout.detail(this.#layout.messages.loading);
     try {
       const models = shown.map((name) => scenes.model(name));
-      const panel = await inspector.panel(models, x, y, lights[active]!.azimuth);
-      const hide = () => {
-        details.hidden = true;
-      };
-      details.replaceChildren(panel, h("button", { type: "button", onclick: hide }, messages.close));
-      details.scrollIntoView({ block: "nearest" });
+      this.#layout.detail(await inspector.panel(models, x, y, lights[active]!.azimuth));
     } catch (error) {
-      details.hidden = true;
+      this.#layout.detail(null);
       this.#report(asProblem(error, store.http.url.href));
     }
     this.#tell("impasto-pixel", { x, y });
@@ -464,18 +425,6 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget {
   async #saveSnapshot(): Promise<void> {
     const { title } = this.#opened!.store.attributes;
     download(await this.snapshot(), `${title.replace(/[^\w.-]+/g, "-")}.png`);
-  }
-
-  async #copyAddress(): Promise<void> {
-    const { problems, messages } = this.#layout;
-    const url = new URL(location.href);
-    url.hash = this.hash;
-    try {
-      await navigator.clipboard.writeText(url.href);
-      problems.say(messages.copied, COPIED_MS);
-    } catch {
-      problems.say(url.href);
-    }
   }
 
   #report(problem: StoreProblem): void {

@@ -3,7 +3,7 @@
 // Every 32nd of matplotlib's 256 entries, and the last; between them each is nearly straight.
 /** viridis, which grows evenly brighter and is told apart by colour-blind eyes too. */
 const SEQUENTIAL = ["440154", "472d7b", "3b528b", "2c728e", "21918c", "28ae80", "5ec962", "addc30", "fde725"];
-/** coolwarm [Moreland2009]. */
+/** Moreland's coolwarm of 2009, as matplotlib has it. */
 const DIVERGING = ["3b4cc0", "6282ea", "8db0fe", "b9d0f9", "dddcdc", "f5c4ac", "f4987a", "dd5f4b", "b40426"];
 
 /** Returns a row of 256 colours as RGBA bytes for each of the two. */

@@ -82,7 +82,8 @@ export class Renderer {
     for (const pane of panes) this.#programOf(pane, scene);
     const coarsest = needed.flatMap((each) => each.coarsest);
     this.#begun ||= coarsest.some((key) => tiles.get(key));
-    const rest = (["visible", "around"] as const).flatMap((kind) => needed.flatMap((each) => each[kind]));
+    const kinds = scene.still ? (["visible", "around"] as const) : (["visible"] as const);
+    const rest = kinds.flatMap((kind) => needed.flatMap((each) => each[kind]));
     // The first picture waits for nothing else.
     this.#ask(this.#begun ? [...coarsest, ...rest] : coarsest);
     let complete = true;

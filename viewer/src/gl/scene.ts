@@ -53,6 +53,8 @@ export interface Scene {
   readonly lights: readonly ShaderLight[];
   readonly exposure: number;
   readonly exaggeration: number;
+  /** Whether nothing has changed for a while: only then are tiles asked for that may be wanted next. */
+  readonly still: boolean;
   /** Whether to blend neighbouring pixels, which takes four times as long. */
   readonly smooth: boolean;
 }

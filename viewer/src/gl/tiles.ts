@@ -1,11 +1,12 @@
 /** Tiles on the graphics card: loaded on demand, nearest first, cancelled when no longer wanted, bounded in memory. */
 
 import { isAbort, type StoreProblem } from "../store/errors";
+import { release } from "../store/gzip";
 import type { Codes, Layer, PublishedStore } from "../store/published";
 import { nearest } from "./program";
 
-/** Browsers open no more connections to a host by HTTP/1.1. */
-const AT_ONCE = 6;
+/** Each takes some 15 MB while it is decoded; browsers open at most six connections to a host by HTTP/1.1. */
+const AT_ONCE = 3;
 const RETRY_MS = 5000;
 
 export interface TileKey {
@@ -44,6 +45,8 @@ export class Tiles {
   readonly #loading = new Map<string, AbortController>();
   readonly #failed = new Map<string, number>();
   #wanted: TileKey[] = [];
+  /** Loads that take memory: also those given up whose chunk is being decoded, which nothing stops. */
+  #running = 0;
   #frame = 0;
   #bytes = 0;
   /** Called when a tile has come. */
@@ -104,7 +107,7 @@ export class Tiles {
   }
 
   #next(): void {
-    while (this.#loading.size < AT_ONCE) {
+    while (this.#running < AT_ONCE) {
       const key = this.#wanted.shift();
       if (!key) return;
       void this.#load(key);
@@ -115,9 +118,13 @@ export class Tiles {
     const name = keyOf(key);
     const controller = new AbortController();
     this.#loading.set(name, controller);
+    this.#running++;
     try {
       const codes = await this.store.chunk(key.layer, key.level, key.row, key.column, controller.signal);
-      if (controller.signal.aborted) return;
+      if (controller.signal.aborted) {
+        release(codes);
+        return;
+      }
       this.#failed.delete(name);
       const tile = this.#upload(key, codes);
       this.#there.set(name, tile);
@@ -130,6 +137,7 @@ export class Tiles {
       this.#failed.set(name, performance.now());
       this.onproblem(error as StoreProblem);
     } finally {
+      this.#running--;
       if (this.#loading.get(name) === controller) this.#loading.delete(name);
       this.#next();
     }
@@ -148,6 +156,8 @@ export class Tiles {
     const data = padded(codes, layer.depth, blocks);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, ...size, gl.RGBA_INTEGER, type, data);
     nearest(gl);
+    release(codes);
+    release(data);
     const [height, width] = this.store.size(key.level);
     return {
       ...key,

@@ -3,7 +3,10 @@
 import * as zarr from "zarrita";
 import { type Attributes, type Column, checked, type ModelEntry } from "./attributes";
 import { asProblem, StoreProblem } from "./errors";
+import { useOwnGzip } from "./gzip";
 import { HttpStore } from "./http";
+
+useOwnGzip();
 
 /** Codes of a chunk, row by row with those of a pixel side by side. */
 export type Codes = Uint16Array | Uint8Array;

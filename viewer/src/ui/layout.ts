@@ -17,10 +17,10 @@ export class Layout {
   readonly canvas: HTMLCanvasElement;
   readonly overlay: Overlay;
   readonly problems: Problems;
-  readonly details: HTMLElement;
   /** What lies over the picture, and everything. */
   readonly stage: HTMLElement;
   readonly frame: HTMLElement;
+  readonly #details: HTMLElement;
   readonly #side = h("div", { class: "side", id: "side" });
   readonly #toggle: HTMLElement;
 
@@ -33,15 +33,15 @@ export class Layout {
     this.canvas.addEventListener("keydown", (event) => actions.key(event));
     this.overlay = new Overlay(m, actions);
     this.problems = new Problems(m);
-    this.details = h("div", { class: "details", role: "region", "aria-live": "polite", hidden: true });
+    this.#details = h("div", { class: "details", role: "region", "aria-live": "polite", hidden: true });
     this.#toggle = h("button", { type: "button", class: "toggle", "aria-controls": "side" }, "☰");
     this.#toggle.addEventListener("click", () => this.showSide(this.#side.classList.contains("closed")));
     this.stage = h(
       "div",
       { class: "stage" },
       this.canvas,
-      this.overlay.element,
       this.overlay.divider,
+      this.overlay.element,
       this.problems.element,
       this.#toggle,
     );
@@ -55,7 +55,18 @@ export class Layout {
 
   /** Puts the controls beside the picture. */
   fill(title: string, ...controls: HTMLElement[]): void {
-    this.#side.replaceChildren(h("h2", {}, title), this.details, ...controls);
+    this.#side.replaceChildren(h("h2", {}, title), this.#details, ...controls);
+  }
+
+  /** Shows details of a pixel above the controls, or hides them. */
+  detail(content: HTMLElement | string | null): void {
+    const details = this.#details;
+    details.hidden = content === null;
+    if (content === null) return;
+    this.showSide(true);
+    const close = h("button", { type: "button", onclick: () => this.detail(null) }, this.messages.close);
+    details.replaceChildren(content, ...(typeof content === "string" ? [] : [close]));
+    details.scrollIntoView({ block: "nearest" });
   }
 
   showSide(open: boolean): void {

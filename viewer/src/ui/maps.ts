@@ -63,7 +63,7 @@ export function contentOf(
   withResidual: boolean,
 ): Content {
   const lit = (mode: Mode): Content => {
-    const residual = mode === "residual" || (mode === "radiance" && withResidual);
+    const residual = withResidual && (mode === "residual" || mode === "radiance");
     return { kind: "model", model, mode, range, residual };
   };
   if (show in MODES) return lit(show as Mode);
@@ -132,7 +132,7 @@ async function coarseValues(show: string, model: ModelEntry, store: PublishedSto
   return pixels.map((pixel) => pick(pixel, specular) / pick(pixel, diffuse));
 }
 
-/** A range for what the residual term adds, the same for all lights: the 98th percentile over pixels of twice its mean. */
+/** A range for what the residual term adds, the same for all lights: the 98th percentile over pixels of its root mean square. */
 async function residualRange(model: ModelEntry, store: PublishedStore): Promise<Range> {
   const layers = [store.layer(model, "parameters"), store.residual(model)!];
   const level = layers[0]!.levels[layers[0]!.levels.length - 1]!;
@@ -158,7 +158,7 @@ async function residualRange(model: ModelEntry, store: PublishedStore): Promise<
     added.push(2 * Math.sqrt((albedo + toe) * Math.max(square, 0)));
   }
   added.sort((a, b) => a - b);
-  const high = 2 * (added[Math.round(0.98 * (added.length - 1))] ?? 0) + 1e-4;
+  const high = (added[Math.round(0.98 * (added.length - 1))] ?? 0) + 1e-4;
   return { low: -high, high, scale: "diverging" };
 }
 

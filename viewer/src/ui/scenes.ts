@@ -68,7 +68,7 @@ export class Scenes {
     return lost ? { ...next, show: "radiance" } : next;
   }
 
-  scene(state: State, view: View, smooth: boolean): Scene {
+  scene(state: State, view: View, still: boolean): Scene {
     return {
       view,
       contents: this.#contents(state),
@@ -76,7 +76,8 @@ export class Scenes {
       lights: shaderLights(state.lights, this.store.attributes.display.matrix),
       exposure: 2 ** state.exposure,
       exaggeration: state.exaggeration,
-      smooth,
+      still,
+      smooth: still && view.scale < 1,
     };
   }
 
@@ -85,7 +86,7 @@ export class Scenes {
     const model = this.model(state.model);
     const range = this.range(show, model);
     const content = (of: ModelEntry, added: boolean) => contentOf(show, of, this.store, range, added);
-    const first = content(model, residual);
+    const first = content(model, residual || show === "residual");
     const photograph = this.photograph(state);
     if (photograph !== null) return [first, { kind: "photograph", light: photograph }];
     if (!compare) return [first];
