@@ -1,21 +1,23 @@
 """Checks of photographs: faults put into real photographs are found, and nothing in the originals."""
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, shift
-from stands import quiet, write_plan
+from stands import faulty_light, quiet, write_plan
 
 from impasto import stand
 from impasto.calibrate.shots import read_shot
 from impasto.capture import read_capture
 from impasto.errors import CaptureError
+from impasto.geometry import Camera, arm_direction, tilt_direction
 from impasto.images import write_png
 from impasto.stand.checks.exposure import as_planned
 from impasto.stand.checks.movement import shift_px
 from impasto.stand.checks.order import exchanged
-from impasto.stand.checks.spheres import dusty, faults, highlight
+from impasto.stand.checks.spheres import check_spheres, faults, highlight
 from impasto.stand.judge import Judge
 from impasto.stand.look import look_at
 from impasto.stand.plan_file import Limits
@@ -157,14 +159,35 @@ def spheres(tmp_path_factory):
     return sorted((folder / "photos" / "calibration" / "spheres").glob("*.tif"))
 
 
-def test_clean_spheres_are_not_complained_of(spheres):
-    assert dusty({path.stem: path for path in spheres}) == []
+def test_clean_spheres_are_not_complained_of_and_show_mirrored_lamps(spheres):
+    """The plan's angles run the other way than the arm's: each photograph by itself is as it should be."""
+    camera = Camera(tilt_direction(0.0, np.radians(5.0)))
+    paths = {path.stem: path for path in spheres}
+    planned = {name: arm_direction(np.radians(float(name[3:]))) for name in paths}
+    assert check_spheres(paths, planned, camera) == []
+    mirrored = {name: at * [-1, 1, 1] for name, at in planned.items()}
+    (finding,) = check_spheres(paths, mirrored, camera)
+    assert finding.check == "order"
+    assert finding.photographs == ("arm+025", "arm+050", "arm-025", "arm-050")  # 0° is its own mirror image
+    assert re.search(r"the lamp stands (4[89]|5[01]) to (9[89]|10[01])° from where", finding.what)
+
+
+def test_an_arm_that_runs_the_other_way_is_named_before_the_painting_is_photographed(tmp_path):
+    plan = write_plan(tmp_path, arm=(-50, -25, 0, 25, 50), times=(1,), calibration=("spheres",))
+    other = str.maketrans("+-", "-+")
+    open_light = faulty_light(lambda name, times: name if name == "arm+000" else name.translate(other))
+    with pytest.raises(CaptureError, match="from where the plan has it, in 4 of 5 photographs"):
+        stand.run(plan, tmp_path / "photos", open_light=open_light, say=quiet)
+    assert list((tmp_path / "photos").glob("*.tif")) == []
 
 
 def test_real_spheres_are_not_complained_of(shared):
     """Their lamps have odd shapes, their highlights are clipped, and they are scratched."""
     folder = shared / "captures" / "cat" / "LightProbe-2"
-    assert dusty({path.stem: path for path in sorted(folder.glob("Image*.JPG"))}) == []
+    paths = {path.stem: path for path in sorted(folder.glob("Image*.JPG"))}
+    capture = read_capture(folder.parent / "Objects", folder.parent / "light_directions.txt")
+    planned = dict(zip(capture.lights.names, capture.lights.direction, strict=True))
+    assert check_spheres(paths, planned, Camera()) == []
 
 
 def test_a_speck_on_a_highlight_is_named():

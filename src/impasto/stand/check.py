@@ -17,7 +17,7 @@ from impasto.progress import progress
 from impasto.stack.brackets import Exposure, read_brackets
 from impasto.stand.checks.coverage import Coverage
 from impasto.stand.checks.finding import Finding
-from impasto.stand.checks.spheres import dusty
+from impasto.stand.checks.spheres import check_spheres
 from impasto.stand.judge import Judge
 from impasto.stand.look import Look, look_at
 from impasto.stand.plan_file import Limits
@@ -116,7 +116,7 @@ def check(
         names=tuple(shot.name for shot in longest),
         clipped=np.array([look.clipped for look in longest.values()]),
         shift_px=np.array([judge.shift_px.get(shot.name, (np.nan, np.nan)) for shot in longest]),
-        findings=(*findings, *judge.order(), *_dust(Path(folder))),
+        findings=(*findings, *judge.order(), *_spheres(Path(folder), capture)),
         coverage=judge.coverage(),
     )
 
@@ -130,9 +130,12 @@ def _shot(capture: Capture, place: str, group: Sequence[Exposure], number: int) 
     return Shot(name.as_posix(), "painting", place, group[number].time, number, number == len(group) - 1)
 
 
-def _dust(folder: Path) -> list[Finding]:
+def _spheres(folder: Path, capture: Capture) -> list[Finding]:
     """Return what is wrong with the photographs of spheres, if there are some."""
     place = folder / CALIBRATION / "spheres"
     if not place.is_dir():
         return []
-    return dusty({f"{CALIBRATION}/spheres/{path.stem}": path for path in find_photographs(place)})
+    paths = {f"{CALIBRATION}/spheres/{path.stem}": path for path in find_photographs(place)}
+    lights = zip(capture.lights.names, capture.lights.direction, strict=True)
+    planned = {f"{CALIBRATION}/spheres/{name}": direction for name, direction in lights}
+    return check_spheres(paths, planned, capture.camera)

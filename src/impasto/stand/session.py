@@ -81,6 +81,8 @@ class Session:
                 while shot := self._missing():
                     self.desk.check_stop()
                     self._take(shot)
+                    if shot.kind == "spheres":
+                        self._look_at_spheres()
             self._finish()
         except StoppedError:
             self.folder.journal.write("stopped")
@@ -196,7 +198,16 @@ class Session:
 
     def _look_at_all(self) -> bool:
         """Check the series as a whole; return whether all of it is kept, and set aside what is not."""
-        findings = [*self.judge.series(), *self.judge.room(), *self._dust()]
+        self._settle([*self.judge.series(), *self.judge.room(), *self._spheres()])
+        return self._missing() is None
+
+    def _look_at_spheres(self) -> None:
+        """Check the spheres once all of their photographs are there, before anything is moved."""
+        if all(shot.name in self.folder.kept for shot in self.shots if shot.kind == "spheres"):
+            self._settle(self._spheres())
+
+    def _settle(self, findings: list[Finding]) -> None:
+        """Have somebody decide about each finding, and set aside what is to be taken again."""
         for finding in findings:
             if set(finding.photographs) <= self._kept_with(finding):
                 continue
@@ -206,7 +217,6 @@ class Session:
                 continue
             for name in finding.photographs:
                 self._set_aside(name, finding.what)
-        return self._missing() is None
 
     def _kept_with(self, finding: Finding) -> set[str]:
         return {
@@ -227,12 +237,17 @@ class Session:
                 self.again += 1
         self._lit = None  # the lamp is shown anew
 
-    def _dust(self) -> list[Finding]:
-        names = [shot.name for shot in self.shots if shot.kind == "spheres" and shot.name in self.folder.kept]
-        findings = []
-        for series in spheres.sphere_names(names).values():
+    def _spheres(self) -> list[Finding]:
+        plan, findings = self.stand.plan, []
+        there = [shot for shot in self.shots if shot.kind == "spheres" and shot.name in self.folder.kept]
+        planned = {
+            shot.name: plan.lights.direction[plan.lights.names.index(shot.place)]
+            for shot in there
+            if shot.place is not None
+        }
+        for series in spheres.sphere_names([shot.name for shot in there]).values():
             paths = {name: self.folder.path / self.folder.kept[name]["file"] for name in series}
-            findings += spheres.dusty(paths)
+            findings += spheres.check_spheres(paths, planned, plan.camera)
         return findings
 
     def _finish(self) -> None:

@@ -1,4 +1,4 @@
-"""Is there dust on a mirror sphere's highlight?"""
+"""What mirror spheres show: dust on their highlights, and where the lamps stand."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, label
 
+from impasto.calibrate.mirror import Rays, find_reflection, given_sphere
 from impasto.calibrate.outline import Circle, find_circles
 from impasto.calibrate.shots import read_shots
-from impasto.geometry import Array
+from impasto.geometry import Array, Camera
 from impasto.stand.checks.finding import Finding
 
 # A lamp's image is what reaches this share of its brightest pixel; where that is clipped, its core alone,
@@ -28,6 +29,9 @@ _LEAST_PX = 40
 _LESS_SOLID = 0.2
 # A second spot of this share of the first's area is no scratch: 0.05 at most on the same spheres.
 _SECOND = 0.15
+# Spheres that are found by themselves tell directions within a few degrees; lamps are further apart.
+_OFF_DEG = 12.0
+_LEAST_LAMPS = 3
 
 
 @dataclass(frozen=True)
@@ -46,13 +50,16 @@ class Highlight:
     second: float
 
 
-def dusty(paths: Mapping[str, Path]) -> list[Finding]:
-    """Return the photographs in which a sphere's highlight is not one whole spot.
+def check_spheres(paths: Mapping[str, Path], planned: Mapping[str, Array], camera: Camera) -> list[Finding]:
+    """Return the photographs of mirror spheres that show dust, or the lamp elsewhere than planned.
 
     Parameters
     ----------
     paths : mapping of str to Path
-        Photographs of mirror spheres under one lamp each, by their names.
+        Photographs under one lamp each, by their names.
+    planned : mapping of str to ndarray of shape (3,)
+        Where their lamps are to stand, of those for which that is known.
+    camera : Camera
 
     Raises
     ------
@@ -64,8 +71,9 @@ def dusty(paths: Mapping[str, Path]) -> list[Finding]:
     shots = read_shots(paths.values())
     images = [shot.linear().mean(axis=2).astype(np.float64) for shot in shots]
     clipped = [np.asarray(shot.clipped.any(axis=2)) for shot in shots]
+    circles = find_circles(np.mean(images, axis=0))
     findings = []
-    for circle in find_circles(np.mean(images, axis=0)):
+    for circle in circles:
         seen = [highlight(image, lost, circle) for image, lost in zip(images, clipped, strict=True)]
         findings += [
             Finding(
@@ -77,7 +85,51 @@ def dusty(paths: Mapping[str, Path]) -> list[Finding]:
             for name, what in zip(paths, faults(seen), strict=True)
             if what
         ]
-    return findings
+    found = lamp_directions(images, clipped, circles, camera)
+    directions = {name: at for name, at in zip(paths, found, strict=True) if at is not None}
+    return findings + misplaced(directions, planned)
+
+
+def lamp_directions(
+    images: Sequence[Array], clipped: Sequence[NDArray[np.bool_]], circles: Sequence[Circle], camera: Camera
+) -> list[Array | None]:
+    """Return the direction of the lamp that is seen in each picture, None where none is."""
+    if len(images) < _LEAST_LAMPS or not circles:
+        return [None] * len(images)
+    rays = Rays(camera, *images[0].shape)
+    spheres = [given_sphere(circle, rays) for circle in circles]
+    # What most lamps leave as it is, is the room.
+    background = np.median(images, axis=0)
+    found: list[Array | None] = []
+    for image, lost in zip(images, clipped, strict=True):
+        seen = [find_reflection(image, background, lost, sphere, rays) for sphere in spheres]
+        directions = [reflection.direction for reflection in seen if reflection is not None]
+        found.append(np.median(directions, axis=0) if directions else None)
+    return found
+
+
+def misplaced(directions: Mapping[str, Array], planned: Mapping[str, Array]) -> list[Finding]:
+    """Return the photographs whose lamp stands elsewhere than planned, as one finding: they have one reason.
+
+    Parameters
+    ----------
+    directions, planned : mapping of str to ndarray of shape (3,)
+        By the photographs' names, of any length.
+    """
+    off = {}
+    for name in directions.keys() & planned.keys():
+        pair = np.array([directions[name], planned[name]])
+        a, b = pair / np.linalg.norm(pair, axis=1, keepdims=True)
+        if (angle := float(np.degrees(np.arccos(np.clip(a @ b, -1, 1))))) > _OFF_DEG:
+            off[name] = angle
+    if not off:
+        return []
+    what = (
+        f"in the spheres, the lamp stands {min(off.values()):.0f} to {max(off.values()):.0f}° from where the "
+        f"plan has it, in {len(off)} of {len(directions)} photographs"
+    )
+    do = "See whether the plan's angles run the other way, and which lamp is lit at each place"
+    return [Finding("order", tuple(sorted(off)), what, do)]
 
 
 def highlight(image: Array, clipped: NDArray[np.bool_], circle: Circle) -> Highlight:
