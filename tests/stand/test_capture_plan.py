@@ -7,10 +7,13 @@ import pytest
 import tifffile
 from stands import quiet, write_plan
 
+import impasto
 from impasto import stand
+from impasto.capture.light_files import read_light_file
 from impasto.errors import CaptureError, OptionError
 from impasto.stand.metering import Metering, meter, rounded
 from impasto.stand.plan_file import read_plan
+from impasto.stand.run import unattended
 from impasto.stand.steps import shots
 
 
@@ -80,6 +83,28 @@ def test_a_plan_of_other_photographs_does_not_go_on_in_a_folder(tmp_path):
     path.write_text(path.read_text().replace('name = "arm+010"', 'name = "arm+011"'))
     with pytest.raises(CaptureError, match="begun by a plan of other photographs"):
         stand.run(path, tmp_path / "photos", say=quiet)
+
+
+def test_times_of_photographs_that_are_not_taken_may_still_be_changed(tmp_path):
+    path = write_plan(tmp_path, arm=(-10, 0, 10), calibration=())
+    desk = unattended()
+
+    def stop(line):
+        if line.startswith("arm+000:"):
+            desk.stop()
+
+    assert not stand.run(path, tmp_path / "photos", desk=desk, say=stop).complete
+    text = path.read_text()
+    path.write_text(text.replace('"arm-010"', '"arm-010"\ntimes_s = [3, 0.125]'))
+    with pytest.raises(CaptureError, match=r"arm-010: was exposed for 2 s, the plan now says 3 s"):
+        stand.run(path, tmp_path / "photos", say=quiet)
+    path.write_text(text.replace('"arm+010"', '"arm+010"\ntimes_s = [3, 0.125]'))
+    assert stand.run(path, tmp_path / "photos", say=quiet).complete
+    light_file = read_light_file(tmp_path / "photos" / "capture.toml")
+    assert [row.exposure_s for row in light_file.rows] == [2, 2, 3]
+    impasto.stack(tmp_path / "photos", tmp_path / "store.zarr")
+    plans = sorted(path.name for path in (tmp_path / "photos" / "record").glob("plan*"))
+    assert plans == ["plan-1.toml", "plan-2.toml"]
 
 
 def test_lights_come_from_what_impasto_angles_plans(tmp_path):

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from impasto.capture.manifest import manifest
-from impasto.capture.photographs import READERS
-from impasto.errors import CaptureError, OutputError, Problem
+from impasto.capture.photographs import READERS, natural_key
+from impasto.errors import CaptureError, OutputError, Problem, raise_problems
 from impasto.geometry import Lights
 from impasto.output import output_error, prepare_folder, write_text
 from impasto.stand.journal import Journal
 from impasto.stand.plan_file import Plan, parse_plan
-from impasto.stand.steps import BRACKETS, Shot, shots
+from impasto.stand.steps import BRACKETS, Shot, shots, shutter
 
 MANIFEST = "capture.toml"
 RECORD = "record"
@@ -52,11 +52,11 @@ class CaptureFolder:
         self.check(path)
         self.incoming = prepare_folder(self.record / "incoming")
         self.set_aside = prepare_folder(self.record / "set-aside")
-        self._keep_plan()
         self.journal = Journal(self.record / "journal.jsonl")
         self.kept: dict[str, dict[str, Any]] = {}
         for entry in self.journal.entries:
             self._follow(entry)
+        self._keep_plan()
         self._finish_what_was_cut_off()
 
     @staticmethod
@@ -168,15 +168,23 @@ class CaptureFolder:
         )
 
     def _keep_plan(self) -> None:
-        """Keep the plan beside the photographs; refuse one that differs from what was begun."""
-        path = self.record / "plan.toml"
-        if not path.exists():
-            write_text(path, self.plan.text)
-        elif path.read_text(encoding="utf-8") != self.plan.text:
-            begun = shots(parse_plan(path.read_text(encoding="utf-8"), path))
-            if begun != shots(self.plan):
-                do = f"Go on with {path}, or capture into another folder"
-                raise CaptureError(Problem(str(self.path), "was begun by a plan of other photographs", do))
+        """Keep the plan beside the photographs, and later ones too, if they are of the same photographs."""
+        kept = sorted(self.record.glob("plan-*.toml"), key=lambda path: natural_key(path.stem))
+        text = kept[-1].read_text(encoding="utf-8") if kept else ""
+        if text == self.plan.text:
+            return
+        if kept and _named(parse_plan(text, kept[-1])) != _named(self.plan):
+            do = f"Go on with {kept[-1]}, or capture into another folder"
+            raise CaptureError(Problem(str(self.path), "was begun by a plan of other photographs", do))
+        planned = {shot.name: shot.exposure_s for shot in shots(self.plan)}
+        do = "Restore the time in the plan; only photographs that are not taken yet may get another"
+        problems = [
+            Problem(name, f"was exposed for {shutter(time)}, the plan now says {shutter(planned[name])}", do)
+            for name, entry in self.kept.items()
+            if (time := entry["exposure_s"]) != planned[name]
+        ]
+        raise_problems(CaptureError, problems)
+        write_text(self.record / f"plan-{len(kept) + 1}.toml", self.plan.text)
 
     def _finish_what_was_cut_off(self) -> None:
         for name, entry in list(self.kept.items()):
@@ -231,6 +239,11 @@ class CaptureFolder:
                 if name in self.kept:
                     known = self.kept[name]
                     self.kept[name] = known | {"kept_with": [*known.get("kept_with", ()), entry["finding"]]}
+
+
+def _named(plan: Plan) -> list[tuple[str, str, str | None]]:
+    """Return what makes photographs the same: name, subject and place, but not the exposure."""
+    return [(shot.name, shot.kind, shot.place) for shot in shots(plan)]
 
 
 def sha256(path: Path) -> str:

@@ -94,9 +94,7 @@ def run(
     ------
     CaptureError
         If the plan or the folder cannot be used, another run is under way, or, where nobody attends, a
-        photograph fails its checks three times.
-    DriverError
-        If, where nobody attends, camera or light fail three times.
+        photograph fails its checks or a device fails three times.
     OutputError
         If the disk is full or the folder cannot be written.
     """
