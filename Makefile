@@ -22,7 +22,7 @@ test-viewer: $(NODE)
 	npm --prefix viewer test
 
 test-python: $(VENV)/.built $(WEB) browser nginx postgresql
-	$(BIN)/pytest
+	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 check: $(VENV)/.built $(NODE)
 	cargo fmt --check --manifest-path core/Cargo.toml

@@ -4,7 +4,9 @@ import json
 import signal
 import subprocess
 import sys
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -139,14 +141,22 @@ def test_an_interrupted_stack_is_continued_to_the_same_bytes(tmp_path, monkeypat
     stack(folder, tmp_path / "whole.zarr")
     path = tmp_path / "s.zarr"
     bands, decoded = Photograph.bands, []
+    heard, shutdown = threading.Event(), ThreadPoolExecutor.shutdown
 
     def stop_in_the_fourth(self, rows):
+        if self.name > "light03":  # a thread may begin with the next before the interruption is heard
+            assert heard.wait(60)
         for row, band in bands(self, rows):
             if self.name == "light03" and row:
                 raise KeyboardInterrupt
             yield row, band
 
+    def hear(self, *arguments, **options):
+        heard.set()
+        shutdown(self, *arguments, **options)
+
     monkeypatch.setattr(Photograph, "bands", stop_in_the_fourth)
+    monkeypatch.setattr(ThreadPoolExecutor, "shutdown", hear)
     monkeypatch.setattr(sys.modules["impasto.stack"], "_decoders", lambda *_: 1)
     with pytest.raises(KeyboardInterrupt):
         stack(folder, path)
