@@ -90,6 +90,8 @@ def test_a_capture_is_led_from_a_tablet_through_reload_and_lost_connection(page,
         press(page, "It stands there")
         expect(page.locator("#now")).to_have_text("All photographs are taken")
     summary = capture.end()
+    page.wait_for_timeout(1500)
+    expect(page.get_by_role("status")).to_be_hidden()  # the page knows that the program has ended
     assert summary.complete
     assert summary.taken == 4
     assert faults == []
@@ -179,10 +181,12 @@ def test_the_terminal_asks_and_takes_keys(monkeypatch):
 
     monkeypatch.setattr("sys.stdin", Terminal("x\nk\n"))
     desk = Desk()
+    desk.show(waiting="Release the shutter: painting, 1/8 s")
     with at_terminal(desk, say):
         assert desk.ask("Where?", {"again": "take it again", "keep": "keep it"}) == "keep"
-    assert "Where?\n  Enter = take it again,  k = keep it,  s = stop here" in said[0]
-    assert said[1] == "That is none of the answers"
+    assert said[0] == "Release the shutter: painting, 1/8 s"
+    assert "Where?\n  Enter = take it again,  k = keep it,  s = stop here" in said[1]
+    assert said[2] == "That is none of the answers"
     assert keys({"stop": "stop", "start": "start"}) == {"": "stop", "s": "stop", "t": "start"}
 
 

@@ -56,10 +56,14 @@ def keys(choices: Mapping[str, str]) -> dict[str, str]:
 
 
 def _print_questions(desk: Desk, say: Callable[[str], None], ended: threading.Event) -> None:
-    asked, version = 0, -1
+    asked, version, waited = 0, -1, None
     while not ended.is_set():
         seen = desk.seen_after(version, 0.5)
         version, question = seen["version"], seen["question"]
+        if (waiting := seen.get("waiting")) != waited:
+            waited = waiting
+            if waiting:
+                say(waiting)
         if question and question["number"] != asked:
             asked = question["number"]
             names = {choice: key for key, choice in keys(question["choices"]).items() if key}

@@ -13,7 +13,7 @@ from impasto.capture.toml_tables import Positive, Table
 from impasto.errors import CaptureError, Problem
 from impasto.stand.drivers import DriverError, Stand
 from impasto.stand.look import look_at
-from impasto.stand.steps import Shot, shutter
+from impasto.stand.steps import Shot
 
 _POLL_S = 0.1
 # Names that programs give to what they are still writing.
@@ -55,7 +55,7 @@ class FolderCamera:
 
     def take(self, shot: Shot, folder: Path) -> Path:
         """Wait for a new photograph."""
-        self._desk.show(waiting=f"Release the shutter: {shutter(shot.exposure_s)}")
+        self._desk.show(waiting=f"Release the shutter: {shot.label}")
         try:
             arrived = self._wait()
         finally:

@@ -76,7 +76,7 @@ class GPhoto2Camera:
                 time.sleep(self._settings.release_delay_s)
                 self._camera.trigger_capture()
             else:
-                self._desk.show(waiting=f"Release the shutter: {shutter(shot.exposure_s)}")
+                self._desk.show(waiting=f"Release the shutter: {shot.label}")
             try:
                 where, name = self._wait()
             finally:

@@ -20,6 +20,7 @@ async function follow() {
       element("lost").hidden = true;
       version = state.version;
       show(state);
+      if (state.ended) return;
     } catch {
       // The program may have been started anew: whatever it shows then is news.
       version = -1;
@@ -30,9 +31,9 @@ async function follow() {
 }
 
 function show(state) {
-  const now = state.now?.label;
-  element("now").textContent =
-    now ?? (state.done === state.total && state.total ? "All photographs are taken" : "Waiting");
+  const all = state.total && state.done === state.total;
+  const still = all ? "All photographs are taken" : state.ended ? "Stopped" : "Waiting";
+  element("now").textContent = state.now?.label ?? still;
   if (state.total) {
     element("count").textContent = `${state.done} of ${state.total} photographs`;
     element("progress").max = state.total;

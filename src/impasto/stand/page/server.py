@@ -70,8 +70,8 @@ def serve_page(desk: Desk, host: str = "127.0.0.1", port: int = 0) -> Iterator[s
     try:
         yield f"http://{shown_host(host)}:{listening.getsockname()[1]}/{token}/"
     finally:
-        server.should_exit = True
         desk.show(ended=True)
+        server.should_exit = True
         thread.join(5)
         listening.close()
 
