@@ -118,13 +118,13 @@ http {{
   include /etc/nginx/mime.types; access_log off;
   client_body_temp_path {folder}/a; proxy_temp_path {folder}/b; fastcgi_temp_path {folder}/c;
   uwsgi_temp_path {folder}/d; scgi_temp_path {folder}/e;
-  server {{ listen 127.0.0.1:{port}; root {root}; }}
+  server {{ listen 127.0.0.1:{port}; root {root}; {ranges} }}
 }}
 """
 
 
-@pytest.mark.parametrize("kind", ["plain", "sharded"])
-def test_nginx_serves_it(kind, folders, page, tmp_path, free_port):
+@pytest.mark.parametrize(("kind", "ranges"), [("plain", ""), ("sharded", ""), ("sharded", "max_ranges 0;")])
+def test_nginx_serves_it(kind, ranges, folders, page, tmp_path, free_port):
     nginx = shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin")
     if nginx is None:
         (pytest.fail if os.environ.get("CI") else pytest.skip)("nginx is not installed: make nginx")
@@ -132,7 +132,7 @@ def test_nginx_serves_it(kind, folders, page, tmp_path, free_port):
     root = shutil.copytree(folders / kind, tmp_path / "root")
     settings = tmp_path / "nginx.conf"
     user = "user root;" if tmp_path.owner() == "root" else ""
-    settings.write_text(user + NGINX.format(folder=tmp_path, port=free_port, root=root))
+    settings.write_text(user + NGINX.format(folder=tmp_path, port=free_port, root=root, ranges=ranges))
     server = subprocess.Popen([nginx, "-c", settings], stderr=subprocess.DEVNULL)
     try:
         page.wait_for_timeout(500)

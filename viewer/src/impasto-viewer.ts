@@ -35,7 +35,8 @@ const sheet = new CSSStyleSheet();
 sheet.replaceSync(css);
 
 const MEGABYTE = 1 << 20;
-const DEFAULT_CACHE_MB = 96;
+/** Enough tiles for a window of 1440 x 900 pixels, without and with a residual term. */
+const DEFAULT_CACHE_MB = { plain: 112, residual: 240 };
 const SETTLED_MS = 160;
 /** How long to leave a compiler alone: before there is anything to see, and after. */
 const COMPILE_MS = { nothing: 8, something: 100 };
@@ -218,7 +219,9 @@ export class ImpastoViewer extends HTMLElement implements GestureTarget, KeyTarg
   }
 
   #newRenderer(gl: WebGL2RenderingContext, store: PublishedStore): Renderer {
-    const megabytes = Number(this.getAttribute("cache-mb")) || DEFAULT_CACHE_MB;
+    const residual = store.attributes.models.some((model) => model.residual);
+    const usual = DEFAULT_CACHE_MB[residual ? "residual" : "plain"];
+    const megabytes = Number(this.getAttribute("cache-mb")) || usual;
     const renderer = new Renderer(gl, store, Math.max(megabytes, 32) * MEGABYTE);
     renderer.tiles.onload = () => this.#draw();
     renderer.tiles.onproblem = (problem) => this.#report(problem);

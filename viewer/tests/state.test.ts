@@ -74,7 +74,9 @@ test("a system of equations is solved", () => {
 });
 
 test("codes are padded to groups of four", () => {
-  expect([...padded(Uint16Array.of(1, 2, 3, 4, 5, 6), 3, 1)]).toEqual([1, 2, 3, 0, 4, 5, 6, 0]);
+  expect([...padded(Uint16Array.of(1, 2, 3, 4, 5, 6), 3, new Uint16Array(8))]).toEqual([
+    1, 2, 3, 0, 4, 5, 6, 0,
+  ]);
 });
 
 test("the checksum of PNG is that of its standard", () => {

@@ -44,6 +44,7 @@ export class Tiles {
   readonly #there = new Map<string, Tile>();
   readonly #loading = new Map<string, AbortController>();
   readonly #failed = new Map<string, number>();
+  readonly #room = new Map<string, Codes>();
   #wanted: TileKey[] = [];
   /** Loads that take memory: also those given up whose chunk is being decoded, which nothing stops. */
   #running = 0;
@@ -153,11 +154,10 @@ export class Tiles {
     const [format, type] =
       layer.bytes === 1 ? [gl.RGBA8UI, gl.UNSIGNED_BYTE] : [gl.RGBA16UI, gl.UNSIGNED_SHORT];
     gl.texStorage2D(gl.TEXTURE_2D, 1, format, ...size);
-    const data = padded(codes, layer.depth, blocks);
+    const data = this.#padded(codes, layer);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, ...size, gl.RGBA_INTEGER, type, data);
     nearest(gl);
     release(codes);
-    release(data);
     const [height, width] = this.store.size(key.level);
     return {
       ...key,
@@ -168,6 +168,17 @@ export class Tiles {
       height: Math.min(layer.chunk, height - key.row * layer.chunk),
       used: this.#frame,
     };
+  }
+
+  /** Codes as groups of four, the rest of a pixel's last group 0; in memory that the next tile takes too. */
+  #padded(codes: Codes, layer: Layer): Codes {
+    const stride = 4 * blocksOf(layer);
+    if (stride === layer.depth) return codes;
+    const key = `${layer.bytes}/${layer.depth}`;
+    const size = layer.chunk * layer.chunk * stride;
+    const room = this.#room.get(key) ?? (layer.bytes === 1 ? new Uint8Array(size) : new Uint16Array(size));
+    this.#room.set(key, room);
+    return padded(codes, layer.depth, room);
   }
 
   #evict(): void {
@@ -183,15 +194,11 @@ export class Tiles {
   }
 }
 
-/** Returns codes with `depth` per pixel as `blocks` groups of four, the rest of the last group 0. */
-export function padded(codes: Codes, depth: number, blocks: number): Codes {
-  const stride = 4 * blocks;
-  if (stride === depth) return codes;
-  const pixels = codes.length / depth;
-  const result: Codes =
-    codes instanceof Uint8Array ? new Uint8Array(pixels * stride) : new Uint16Array(pixels * stride);
-  for (let pixel = 0, from = 0, to = 0; pixel < pixels; pixel++, to += stride - depth) {
-    for (let i = 0; i < depth; i++) result[to++] = codes[from++]!;
+/** Writes codes of `depth` per pixel into `room`, which has more for each, and returns it. */
+export function padded(codes: Codes, depth: number, room: Codes): Codes {
+  const stride = (room.length * depth) / codes.length;
+  for (let from = 0, to = 0; from < codes.length; to += stride - depth) {
+    for (let i = 0; i < depth; i++) room[to++] = codes[from++]!;
   }
-  return result;
+  return room;
 }
