@@ -17,7 +17,14 @@ WHITE_LEVEL = 16383
 _CFA = 32803
 
 
-def write_dng(path: Path, image: NDArray[np.uint16], *, exposure_s: float | None = None) -> None:
+def write_dng(
+    path: Path,
+    image: NDArray[np.uint16],
+    *,
+    exposure_s: float | None = None,
+    iso: int = 100,
+    camera: str = "simulated camera",
+) -> None:
     """Write an image as an uncompressed DNG file of 14 bits, red first.
 
     Parameters
@@ -27,6 +34,10 @@ def write_dng(path: Path, image: NDArray[np.uint16], *, exposure_s: float | None
         Linear, 65535 where the sensor is saturated.
     exposure_s : float, optional
         Exposure time to note.
+    iso : int, optional
+        To note.
+    camera : str, optional
+        Model to note; its make is "impasto".
 
     Raises
     ------
@@ -42,7 +53,7 @@ def write_dng(path: Path, image: NDArray[np.uint16], *, exposure_s: float | None
             temporary,
             _mosaic(image),
             photometric=_CFA,
-            extratags=_tags(exposure_s),
+            extratags=_tags(exposure_s, iso, camera),
             metadata=None,
             software=False,
         )
@@ -56,21 +67,21 @@ def _mosaic(image: NDArray[np.uint16]) -> NDArray[np.uint16]:
     return np.rint(counts).astype(np.uint16)
 
 
-def _tags(exposure_s: float | None) -> list[tuple[int, str, int, Any, bool]]:
+def _tags(exposure_s: float | None, iso: int, camera: str) -> list[tuple[int, str, int, Any, bool]]:
     def rationals(*values: float) -> tuple[int, ...]:
         return tuple(part for value in values for part in (round(value * 1_000_000), 1_000_000))
 
     tags: list[tuple[int, str, int, Any, bool]] = [
         (254, "I", 1, 0, True),  # the full picture
         (271, "s", 0, "impasto", True),
-        (272, "s", 0, "simulated camera", True),
+        (272, "s", 0, camera, True),
         (274, "H", 1, 1, True),
         (33421, "H", 2, (2, 2), True),  # size of the colour filter array
         (33422, "B", 4, bytes([0, 1, 1, 2]), True),
-        (34855, "H", 1, 100, True),  # ISO
+        (34855, "H", 1, iso, True),  # ISO
         (50706, "B", 4, bytes([1, 4, 0, 0]), True),
         (50707, "B", 4, bytes([1, 1, 0, 0]), True),
-        (50708, "s", 0, "impasto simulated camera", True),
+        (50708, "s", 0, f"impasto {camera}", True),
         (50713, "H", 2, (2, 2), True),
         (50714, "I", 4, (BLACK_LEVEL,) * 4, True),
         (50717, "I", 1, WHITE_LEVEL, True),
