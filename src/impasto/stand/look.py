@@ -36,7 +36,7 @@ class Look:
     clipped : float
         Share of the samples at full scale.
     histogram : ndarray of shape (C, 64)
-        Shares of the samples per channel, over the square root of the linear values.
+        Shares of the samples per channel, over the square root of the linear values; of every so many pixels.
     reduced : ndarray of shape (h, w, C), float32
         Relative radiance, means of blocks, at most 900 pixels on the longer side.
     reduced_clipped : ndarray of shape (h, w), bool
@@ -103,9 +103,8 @@ def look_at(path: Path, transfer: str | None = None, clip_level: float | None = 
     reduced = np.empty((rows, columns, channels), np.float32)
     lost = np.empty((rows, columns), bool)
     slices = part_slices(height, width)
-    sizes = [(down.stop - down.start, across.stop - across.start) for down, across in slices]
-    parts = [np.empty(size, np.float32) for size in sizes]
-    parts_clipped = [np.empty(size, bool) for size in sizes]
+    parts = [np.empty(_size(part), np.float32) for part in slices]
+    parts_clipped = [np.empty(_size(part), bool) for part in slices]
     level = CLIP_LEVEL[photograph.dtype.name] if clip_level is None else clip_level
     linear = _linear(photograph)
     digest = hashlib.sha256()
@@ -119,30 +118,41 @@ def look_at(path: Path, transfer: str | None = None, clip_level: float | None = 
         over = np.asarray(band >= level)
         values: NDArray[Any] = linear(band)
         clipped += int(np.count_nonzero(over))
-        bins = np.clip(np.sqrt(np.maximum(values, 0)) * _BINS, 0, _BINS - 1).astype(np.uint8)
-        for channel in range(channels):
-            histogram[channel] += np.bincount(bins[..., channel].ravel(), minlength=_BINS)
+        histogram += _histogram(values[::step, ::step])
+        lost_here = over[..., 0].copy()
+        for channel in range(1, channels):  # ten times as fast as any() over the short axis
+            lost_here |= over[..., channel]
         target = slice(row // step, row // step + -(-len(band) // step))
         reduced[target] = _blocks(values, step)
-        luminance, lost_here = np.asarray(values.mean(axis=2)), np.asarray(over.any(axis=2))
         lost[target] = _blocks(lost_here[..., None].astype(np.float32), step)[..., 0] > 0
         for number, (down, across) in enumerate(slices):
             top, bottom = max(down.start, row), min(down.stop, row + len(band))
             if top < bottom:
-                rows_in_part = slice(top - down.start, bottom - down.start)
-                parts[number][rows_in_part] = luminance[top - row : bottom - row, across]
-                parts_clipped[number][rows_in_part] = lost_here[top - row : bottom - row, across]
-    samples = height * width * channels
+                into, of = slice(top - down.start, bottom - down.start), slice(top - row, bottom - row)
+                parts[number][into] = values[of, across].mean(axis=2)
+                parts_clipped[number][into] = lost_here[of, across]
     return Look(
         photograph=photograph,
         pixels_sha256=digest.hexdigest() if highest > lowest else "",
-        clipped=clipped / samples,
-        histogram=histogram / (height * width),
+        clipped=clipped / (height * width * channels),
+        histogram=histogram / histogram[0].sum(),
         reduced=reduced,
         reduced_clipped=lost,
         parts=tuple(log_level(part).astype(np.float16) for part in parts),
         parts_clipped=tuple(parts_clipped),
     )
+
+
+def _size(part: tuple[slice, slice]) -> tuple[int, int]:
+    down, across = part
+    return down.stop - down.start, across.stop - across.start
+
+
+def _histogram(values: NDArray[Any]) -> NDArray[np.int64]:
+    """Return how many values of each channel fall into each bin, shape (C, bins)."""
+    bins = np.clip(np.sqrt(np.maximum(values, 0)) * _BINS, 0, _BINS - 1).astype(np.uint8)
+    counts = [np.bincount(bins[..., channel].ravel(), minlength=_BINS) for channel in range(bins.shape[2])]
+    return np.array(counts, np.int64)
 
 
 def _linear(photograph: Photograph) -> Callable[[NDArray[Any]], NDArray[np.float32]]:
