@@ -11,6 +11,7 @@ import impasto
 from impasto import stand
 from impasto.capture.light_files import read_light_file
 from impasto.errors import CaptureError, OptionError
+from impasto.stand.drivers import CAMERAS, LIGHTS, settings_of
 from impasto.stand.metering import Metering, meter, rounded
 from impasto.stand.plan_file import read_plan
 from impasto.stand.run import unattended
@@ -32,6 +33,15 @@ def test_what_needs_the_painting_away_comes_first(tmp_path):
 def test_exposures_of_a_place_follow_each_other(tmp_path):
     names = [shot.name for shot in shots(read_plan(write_plan(tmp_path, arm=(-10, 10), calibration=())))]
     assert names == ["arm-010", "brackets/1/arm-010", "arm+010", "brackets/1/arm+010"]
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_a_plan_for_every_driver_can_be_read(camera, light, tmp_path):
+    stand.plan(tmp_path / "plan.toml", arm_deg=(-10, 10), camera=camera, light=light)
+    plan = read_plan(tmp_path / "plan.toml")
+    assert plan.camera_settings.model_dump() == settings_of(CAMERAS, camera)().model_dump()
+    assert plan.light_settings.model_dump() == settings_of(LIGHTS, light)().model_dump()
 
 
 def test_all_problems_of_a_plan_are_told_at_once(tmp_path):

@@ -33,7 +33,7 @@ class CommandLight:
     class Settings(Table):
         """The table ``[light.command]``: commands, with the placeholders of `places.filled`."""
 
-        show: str = Field(min_length=1)
+        show: str = Field("impasto-lamp {name}", min_length=1)
         off: str = ""
         timeout_s: Positive = 60.0
 
