@@ -58,9 +58,20 @@ def test_the_page_holds_the_errors_that_were_found(made):
 def test_each_step_is_announced_as_the_command_that_does_it(made):
     summary, said = made
     commands = [line.split()[2] for line in said if line.strip().startswith("$ impasto")]
-    steps = ["simulate", "stack", "fit", "evaluate", "render", "maps", "experiment"]
+    steps = ["simulate", "calibrate", "stack", "fit", "evaluate", "render", "maps", "experiment"]
     assert list(dict.fromkeys(commands)) == [*steps, "scale"]
     assert list(summary.steps) == steps
+
+
+def test_the_photographs_are_read_with_what_the_calibration_shots_told(made):
+    summary, _ = made
+    found = summary.calibrated
+    assert (len(found.lights.spheres), len(found.lights.names)) == (2, 45)
+    assert found.off_deg < 1  # of spheres of a few pixels
+    assert found.response.linear
+    stack = impasto.open(summary.store)["stack"].attrs
+    assert set(stack["calibration"]) == {"dark", "colour"}
+    assert f"{found.off_deg:.2f}° off the simulated lamps" in summary.page.read_text(encoding="utf-8")
 
 
 def test_simulated_observers_judge_by_lights_that_no_fit_has_seen_and_are_named_simulated(made):

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from impasto.capture.simulate import simulate
-from impasto.demo import observers
+from impasto.demo import calibration, observers
 from impasto.demo.page import DemoSummary, write_page
 from impasto.errors import OutputError, Problem
 from impasto.evaluate import evaluate
@@ -23,6 +23,7 @@ from impasto.maps import maps
 from impasto.render import render
 from impasto.stack import stack
 from impasto.store import open_stack
+from impasto.summaries.calibrate import lights_lines, oecf_lines
 from impasto.summaries.evaluate import evaluate_tables
 from impasto.summaries.experiment import simulate_lines
 from impasto.summaries.fit import fit_lines
@@ -37,7 +38,7 @@ _SWEEP_DEG = tuple(range(-66, 67, 6))
 # What an earlier demo left, and nothing else, may be replaced.
 _PARTS = (
     *("photos", "painting.zarr", "painting.zarr.log.jsonl", "renderings", "maps", "index.html"),
-    *observers.PARTS,
+    *(calibration.PART, *observers.PARTS),
 )
 _MARK = "demo.txt"
 
@@ -49,7 +50,7 @@ def demo(
     say: Callable[[str], None] = lambda line: None,
     show_progress: bool | None = None,
 ) -> DemoSummary:
-    """Simulate a painting, stack, fit two models, render, evaluate, compare, and write a page about it.
+    """Simulate a painting, calibrate, stack, fit two models, render, evaluate, and write a page about it.
 
     Parameters
     ----------
@@ -78,8 +79,21 @@ def demo(
     with clock.step("simulate", f"simulate {photos} --dome --lights {_LIGHTS} --size {size[0]},{size[1]}"):
         simulated = simulate(photos, dome=True, lights=_LIGHTS, size=size, show_progress=show_progress)
         say(f"{simulated.photographs} photographs of a still life that does not exist")
-    with clock.step("stack", f"stack {photos} {store}"):
-        stacked = stack(photos, store, show_progress=show_progress)
+    with clock.step("calibrate", *calibration.commands(photos, folder)):
+        calibrated = calibration.calibrate_studio(photos, folder)
+        for line in (*lights_lines(calibrated.lights), *oecf_lines(calibrated.response)):
+            say(line)
+    dark, colour = calibrated.dark.file, calibrated.colour.file
+    files = f"--lights {calibrated.lights_file} --dark {dark} --colour {colour}"
+    with clock.step("stack", f"stack {photos} {store} {files}"):
+        stacked = stack(
+            photos,
+            store,
+            lights=calibrated.lights_file,
+            dark=dark,
+            colour=colour,
+            show_progress=show_progress,
+        )
         for line in stack_lines(stacked):
             say(line)
     lights = open_stack(store).lights
@@ -97,8 +111,7 @@ def demo(
         )
         for heading, header, rows in evaluate_tables(evaluated):
             say(f"{heading}: " + ", ".join(f"{header[k]} {rows[-1][k]}" for k in (2, 3, 4)))
-    # A photograph's own light has the photograph's exposure; pictures are brightened by as much.
-    exposure = 1 / float(held.intensity.max())
+    exposure = 1 / calibrated.white
     sweep = f"{_SWEEP_DEG[0]}:{_SWEEP_DEG[-1]}:{_SWEEP_DEG[1] - _SWEEP_DEG[0]}"
     renderings = folder / "renderings"
     with clock.step("render", f"render {store} --model {MODELS[0]} --arm {sweep} --out {renderings}/sweep"):
@@ -130,6 +143,7 @@ def demo(
     summary = DemoSummary(
         page=folder / "index.html",
         store=store,
+        calibrated=calibrated,
         stacked=stacked,
         fitted=fitted,
         evaluated=evaluated,

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from impasto.colour import encode_srgb, quantise
 from impasto.console import versions
+from impasto.demo.calibration import CalibrationSummary
 from impasto.demo.observers import ObserversSummary
 from impasto.evaluate import EvaluateSummary
 from impasto.fit import FitSummary
@@ -41,6 +42,7 @@ class DemoSummary:
         The page to open in a browser.
     store : Path
         The painting's store.
+    calibrated : CalibrationSummary
     stacked : StackSummary
     fitted : FitSummary
     evaluated : EvaluateSummary
@@ -59,6 +61,7 @@ class DemoSummary:
 
     page: Path
     store: Path
+    calibrated: CalibrationSummary
     stacked: StackSummary
     fitted: FitSummary
     evaluated: EvaluateSummary
@@ -100,6 +103,7 @@ def write_page(summary: DemoSummary, truth: Path) -> None:
         shown.append(Picture(sweep.animation.read_bytes(), caption, "image/webp"))
     page.section("The painting").pictures(shown, columns=2)
 
+    _write_calibration(page.section("How camera and lights were calibrated"), summary.calibrated)
     part = page.section("Lights that the fit has not seen")
     part.text(
         "These photographs were kept out of the fit, and rendered from it. All pictures are brightened "
@@ -153,7 +157,8 @@ def write_page(summary: DemoSummary, truth: Path) -> None:
     part.commands(
         (
             "impasto simulate photos/ --dome",
-            "impasto stack photos/ painting.zarr",
+            "impasto calibrate lights photos/calibration/spheres --camera photos/capture.toml --out lights/",
+            "impasto stack photos/ painting.zarr --lights lights/lights.toml",
             "impasto fit painting.zarr",
             "impasto evaluate painting.zarr --held-out 5",
             "impasto render painting.zarr --model torrance-sparrow --arm -66:66:6 --out film/",
@@ -172,6 +177,28 @@ def write_page(summary: DemoSummary, truth: Path) -> None:
     )
     part.text(versions())
     page.write(summary.page)
+
+
+def _write_calibration(part: Section, calibrated: CalibrationSummary) -> None:
+    """Write what the simulated calibration shots told."""
+    lights, response, colour = calibrated.lights, calibrated.response, calibrated.colour
+    left_out = np.mean(colour.fits[colour.chosen].left_out)
+    use = "needs no function of its own" if response.linear else "got a function of its own"
+    part.table(
+        ("shot", "what it told"),
+        [
+            (
+                f"{count(len(lights.spheres), 'mirror sphere')}",
+                f"directions of {count(len(lights.names), 'light')}, {calibrated.off_deg:.2f}° off the "
+                "simulated lamps in the median",
+            ),
+            ("grey scale", f"the camera is linear within {percent(response.nonlinearity)} and {use}"),
+            ("cap on", f"{count(calibrated.dark.hot, 'hot pixel')}; the level is taken off each photograph"),
+            ("colour chart", f"CIEDE2000 {left_out:.2f} for patches left out of the fit"),
+        ],
+        caption="Simulated shots for calibration, with which the photographs were read",
+        words=True,
+    )
 
 
 def _write_observers(part: Section, compared: ObserversSummary) -> None:
