@@ -17,6 +17,8 @@ from impasto.stand.plan_file import Limits
 from impasto.stand.steps import Shot
 
 _REFERENCES = 4
+# What is darker than this share of full scale shows its noise as edges.
+_LEAST_BRIGHT = 0.01
 
 
 @dataclass(frozen=True)
@@ -142,7 +144,8 @@ class Judge:
             return []
         nearest = max(longer, key=lambda seen: seen.shot.bracket)
         findings = exposure.exposure_ratio(look, shot, nearest.look, nearest.shot)
-        if detailed := [seen for seen in longer if seen.look.parts]:
+        detailed = [seen for seen in longer if seen.look.parts]
+        if detailed and look.bright >= _LEAST_BRIGHT:
             other = max(detailed, key=lambda seen: seen.shot.bracket)
             shift = movement.shift_px(look, [other.look])
             findings += movement.moved(shift, shot, self.limits, other.shot)

@@ -165,7 +165,7 @@ def plan(
             "times_s": times,
             "photograph_mb": metering.photograph_mb if metering else 0.2 if camera == "simulated" else 60.0,
         },
-        "limits": {"clipped": 0.001, "dark": 0.03, "moved_px": 0.3, "blur": 0.15, "ambient": 0.01},
+        "limits": {"clipped": 0.001, "dark": 0.03, "moved_px": 0.33, "blur": 0.15, "ambient": 0.01},
         "calibration": _calibration(calibration, times, frontal),
         "place": places,
     }

@@ -65,7 +65,7 @@ class Limits(Table):
 
     clipped: _Share = 0.001
     dark: _Share = 0.03
-    moved_px: Positive = 0.3
+    moved_px: Positive = 0.33
     blur: Annotated[float, Field(gt=0, lt=1)] = 0.15
     ambient: _Share = 0.01
 

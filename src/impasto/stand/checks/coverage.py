@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto.angles.identifiability import Identifiability, identify
+from impasto.angles.highlights import highlight_widths_deg
+from impasto.angles.identifiability import identify
 from impasto.angles.photographed import camera_for
 from impasto.angles.surfaces import USUAL_NOISE
 from impasto.fit import fit_tile
@@ -101,10 +102,9 @@ def coverage(radiance: NDArray[np.float32], lights: Lights, camera: Camera) -> C
     places = np.flatnonzero(usable)
     pixels = pixels_of_maps(attributes, (1, count), np.zeros_like(places), places, kept)
     found = identify(pixels, lights, camera, USUAL_NOISE)
+    narrowest, *_ = highlight_widths_deg(pixels, in_plane.view_direction)
     seen = sum(kind.seen for kind in found.kinds) / len(found.kinds)
-    return Coverage(
-        len(lights), len(places), _narrowest_deg(found), found.gap_deg, float(seen), found.sentences
-    )
+    return Coverage(len(lights), len(places), narrowest, found.gap_deg, float(seen), found.sentences)
 
 
 def coarse_radiance(exposures: Sequence[Sequence[tuple[Look, float]]]) -> NDArray[np.float32]:
@@ -129,7 +129,3 @@ def coarse_radiance(exposures: Sequence[Sequence[tuple[Look, float]]]) -> NDArra
     stacked = np.stack(merged).astype(np.float32)
     stacked[~np.isfinite(stacked)] = np.nan
     return stacked.reshape(len(stacked), -1, stacked.shape[-1])
-
-
-def _narrowest_deg(found: Identifiability) -> float:
-    return min(kind.width_deg[0] for kind in found.kinds)
