@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 import impasto
-from impasto.cli import app
+from impasto.cli.commands import app
 
 MODEL = "torrance-sparrow"
 runner = CliRunner()
@@ -41,7 +41,7 @@ def test_help_comes_fast():
 
 def test_help_imports_nothing_heavy():
     script = (
-        "import sys, impasto.cli; "
+        "import sys, impasto.cli.commands; "
         "print([name for name in ('zarr', 'xarray', 'matplotlib', 'scipy', 'skimage', 'OpenImageIO') "
         "if name in sys.modules])"
     )

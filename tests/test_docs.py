@@ -11,7 +11,7 @@ import pytest
 import typer
 
 import impasto
-from impasto.cli import app
+from impasto.cli.commands import app
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])

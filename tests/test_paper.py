@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import impasto
 from impasto import store as stores
 from impasto.capture.simulate.measured import read_measured
-from impasto.cli import app
+from impasto.cli.commands import app
 from impasto.errors import OptionError
 from impasto.fit import FitOptions
 from impasto.fit.paper import Paper

@@ -10,7 +10,7 @@ from impasto.angles.identifiability import identify
 from impasto.angles.plan import check, plan
 from impasto.angles.surfaces import USUAL_NOISE, assumed_surface
 from impasto.capture.light_files import read_light_file
-from impasto.cli import app
+from impasto.cli.commands import app
 from impasto.errors import CaptureError, OptionError, StoreError
 from impasto.geometry import Camera, Lights, arm_direction, dome_direction
 from impasto.summaries.angles import plan_lines

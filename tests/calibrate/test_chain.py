@@ -5,7 +5,7 @@ from typer.testing import CliRunner
 
 import impasto
 from impasto.capture.simulate import simulate
-from impasto.cli import app
+from impasto.cli.commands import app
 
 
 def run(*words):

@@ -5,7 +5,7 @@ import pytest
 from typer.testing import CliRunner
 
 from impasto.capture.simulate.dng import write_dng
-from impasto.cli import app
+from impasto.cli.commands import app
 
 SIDE = 40
 

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 import impasto
-from impasto.cli import app
+from impasto.cli.commands import app
 from impasto.psychophysics.experiment.manifest import read_experiment
 from impasto.psychophysics.experiment.serve import TOKEN_FILE, TOKEN_VARIABLE, admin_token
 

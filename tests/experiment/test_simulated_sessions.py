@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 import impasto
-from impasto.cli import app
+from impasto.cli.commands import app
 from impasto.errors import OptionError
 from impasto.psychophysics import ObserverModel, measure_differences
 from impasto.psychophysics.experiment.administer import opened

@@ -7,7 +7,7 @@ from scipy.stats import binomtest
 from typer.testing import CliRunner
 
 import impasto
-from impasto.cli import app
+from impasto.cli.commands import app
 from impasto.errors import OptionError
 from impasto.psychophysics.planning import information_gain, next_pairs, observers_needed, stopping_rule
 from impasto.psychophysics.scaling.comparisons import Comparisons, count_choices

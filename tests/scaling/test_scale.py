@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 import impasto
-from impasto.cli import app
+from impasto.cli.commands import app
 from impasto.errors import OptionError
 from impasto.psychophysics.differences import image_difference, measure_differences
 from impasto.psychophysics.scaling.comparisons import count_choices

@@ -6,7 +6,7 @@ import sys
 
 from typer.testing import CliRunner
 
-from impasto.cli import app
+from impasto.cli.commands import app
 from impasto.stand.journal import Journal
 from impasto.store import open_stack
 

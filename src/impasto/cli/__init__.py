@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import sys
 from contextlib import suppress
 from importlib import import_module
-
-from impasto.cli.app import app
 
 # In the order in which the help lists them.
 COMMANDS = (
@@ -33,9 +32,6 @@ COMMANDS = (
     "demo",
 )
 
-for _name in COMMANDS:
-    import_module(f"{__name__}.{_name}")
-
 # Parameters of glibc's mallopt.
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 
@@ -43,6 +39,11 @@ _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 def main() -> None:
     """Run the command line."""
     _keep_freed_memory()
+    # All subcommands take a while to load; the one that is called is enough.
+    called = next(iter(sys.argv[1:]), "")
+    import_module(f"{__name__}.{called if called in COMMANDS else 'commands'}")
+    from impasto.cli.app import app
+
     app()
 
 
