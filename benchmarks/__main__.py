@@ -76,16 +76,20 @@ def speed_rows(pixels: int, scipy_pixels: int, threads: int) -> list[Row]:
 def procedure_rows(folder: Path, side_px: int) -> list[Row]:
     """Compare the paper procedure with the joint one."""
     speeds = procedures.measure(folder, side_px)
-    return [
-        Row("joint procedure, px per CPU-second", speeds["joint"], note=f"{LIGHTS} lights in a dome"),
-        Row(
-            "paper procedure, px per CPU-second",
-            speeds["paper"],
-            speeds["joint"],
-            at_least=True,
-            note=f"{LIGHTS} lights on an arm; the bar is the joint procedure",
-        ),
-    ]
+    rows = []
+    for what in ("fit", "store to store"):
+        joint, paper = (speeds[procedure][what] for procedure in ("joint", "paper"))
+        rows += [
+            Row(f"joint procedure, {what}, px per CPU-second", joint, note=f"{LIGHTS} lights in a dome"),
+            Row(
+                f"paper procedure, {what}, px per CPU-second",
+                paper,
+                joint,
+                at_least=True,
+                note=f"{LIGHTS} lights on an arm; the bar is the joint procedure",
+            ),
+        ]
+    return rows
 
 
 def angles_rows(folder: Path, side_px: int, pixels: int) -> list[Row]:
