@@ -68,9 +68,9 @@ def test_few_lights_leave_narrow_highlights_uncovered_and_many_cover_them(tmp_pa
         folder = tmp_path / str(step)
         folder.mkdir()
         path = write_plan(
-            folder, sample="e", arm=range(-60, 61, step), times=(1, 0.0625), calibration=(),
-            # From lamp to lamp this sample changes its look more than a blur would.
-            replace=[("blur = 0.15", "blur = 0.9")],
+            folder, sample="h", arm=range(-60, 61, step), times=(1, 0.0625), calibration=(),
+            # From lamp to lamp this sample changes its look more than a blur would, or a step aside.
+            replace=[("blur = 0.15", "blur = 0.9"), ("moved_px = 0.33", "moved_px = 2")],
         )  # fmt: skip
         found[step] = stand.run(path, folder / "photos", say=quiet).coverage
     assert found[12].gap_deg > found[4].gap_deg
