@@ -3,13 +3,16 @@
 import threading
 import time
 
+import numpy as np
 import pytest
 from grbl import Grbl, Marlin
 from stands import ARM, quiet, stand_of, write_plan
 
+import impasto
 from impasto import stand
 from impasto.stand.desk import Desk
 from impasto.stand.drivers import DriverError, open_light
+from impasto.store import open_stack
 
 SETTINGS = 'port = "/dev/ttyUSB0"'
 
@@ -102,16 +105,26 @@ def test_an_arm_that_lost_its_place_is_noticed(arm, tmp_path):
     light.close()
 
 
-def test_a_line_that_drops_is_named_and_the_capture_goes_on_when_it_is_back(tmp_path):
+def arm_plan(folder, port):
+    folder.mkdir(exist_ok=True)
+    return write_plan(
+        folder, light="gcode", arm=(-40, -20, 0, 20, 40), times=(1,),
+        calibration=(), replace=[(SETTINGS, f'port = "{port}"'), ("timeout_s = 60", "timeout_s = 2"),
+                                 ("settle_s = 1", "settle_s = 0")],
+    )  # fmt: skip
+
+
+def radiance(photos, store):
+    impasto.stack(photos, store)
+    stack = open_stack(store)
+    return stack.lights.names, stack.radiance(slice(0, stack.shape[1]), slice(0, stack.shape[2]))
+
+
+def test_a_line_that_drops_is_named_and_the_capture_goes_on_when_it_is_back(arm, tmp_path):
     """The cable is pulled between two photographs, and plugged in again: another port of the same name."""
     port = tmp_path / "arm"
     arms = [Grbl()]
     port.symlink_to(arms[0].port)
-    plan = write_plan(
-        tmp_path, light="gcode", arm=(-40, -20, 0, 20, 40), times=(1,),
-        calibration=(), replace=[(SETTINGS, f'port = "{port}"'), ("timeout_s = 60", "timeout_s = 2"),
-                                 ("settle_s = 1", "settle_s = 0")],
-    )  # fmt: skip
     said = []
 
     def say(line):
@@ -123,11 +136,18 @@ def test_a_line_that_drops_is_named_and_the_capture_goes_on_when_it_is_back(tmp_
             port.unlink()
             port.symlink_to(arms[1].port)
 
-    summary = stand.run(plan, tmp_path / "photos", say=say)
+    summary = stand.run(arm_plan(tmp_path / "dropped", port), tmp_path / "photos", say=say)
     assert summary.complete
     assert len(arms) == 2
     assert arms[1].position == 40
     arms[1].close()
+
+    undisturbed = tmp_path / "undisturbed"
+    assert stand.run(arm_plan(undisturbed, arm.port), undisturbed / "photos", say=quiet).complete
+    names, made = radiance(tmp_path / "photos", tmp_path / "store.zarr")
+    expected_names, expected = radiance(undisturbed / "photos", undisturbed / "store.zarr")
+    assert names == expected_names
+    assert np.abs(made - expected).max() < 0.02  # the sensor's noise
 
 
 def test_nobody_at_the_port_is_named(tmp_path):
