@@ -11,8 +11,9 @@ import shutil
 import time
 from pathlib import Path
 
+from benchmarks.browser import Browser
 from tests.conftest import CHROMIUM_FLAGS
-from tests.viewer_pages import complete, static_host
+from tests.viewer_pages import READY, static_host
 
 import impasto
 from impasto.capture.simulate import simulate
@@ -21,6 +22,8 @@ from impasto.store import level_sizes
 SIZE = (15_000, 20_000)
 TILE = 512
 PANNING_S = 120
+# A browser that has just started is busy with itself.
+SETTLING_S = 3
 WINDOW = {"width": 1440, "height": 900}
 FIRST = """
 new Promise(resolve => {
@@ -37,43 +40,43 @@ def measure(folder: Path, panning_s: float = PANNING_S) -> dict[str, float]:
     Memory is the proportional set size of all processes of the browser, its graphics process included, above
     what they take before the page is opened.
     """
-    from playwright.sync_api import sync_playwright
-
     site = write_large(folder)
-    with static_host(site) as url, sync_playwright() as playwright:
-        executable = shutil.which("chromium")
-        browser = playwright.chromium.launch(executable_path=executable, args=CHROMIUM_FLAGS)
-        page = browser.new_page(viewport=WINDOW)
-        page.add_init_script("addEventListener('impasto-ready', e => window.first = e.detail)")
+    executable = shutil.which("chromium") or "chromium"
+    profile = str(folder / "profile")
+    with (
+        static_host(site) as url,
+        Browser(executable, CHROMIUM_FLAGS, profile, **WINDOW) as browser,
+    ):
+        browser.send(
+            "Page.addScriptToEvaluateOnNewDocument",
+            source="addEventListener('impasto-ready', e => window.first = e.detail)",
+        )
+        time.sleep(SETTLING_S)
         before = memory_bytes()
-        page.goto(url)
-        complete(page, 120)
-        first = page.evaluate(FIRST)
-        page.evaluate(f"{VIEWER}.hash = 'view=3000,3000,0.5'")
+        browser.open(url)
+        browser.evaluate(f"({READY})(120)")
+        first = browser.evaluate(FIRST)
+        browser.evaluate(f"{VIEWER}.hash = 'view=3000,3000,0.5'")
         x, y = WINDOW["width"] / 3, WINDOW["height"] / 2
         largest, frames, end = 0, 0, time.monotonic() + panning_s
         while time.monotonic() < end:
-            page.mouse.move(x + 300, y)
-            page.mouse.down()
-            page.mouse.move(x - 300, y + (40 if frames % 20 < 10 else -40), steps=6)
-            page.mouse.up()
-            page.wait_for_timeout(200)
+            browser.drag((x + 300, y), (x - 300, y + (40 if frames % 20 < 10 else -40)))
+            time.sleep(0.2)
             frames += 1
             if frames % 25 == 0:  # another size, and the other end of the painting
                 scale = (1.0, 0.25, 0.5)[frames // 25 % 3]
-                page.evaluate(f"{VIEWER}.hash = 'view={frames * 397 % 20000},{frames * 211 % 15000},{scale}'")
+                place = f"{frames * 397 % 20000},{frames * 211 % 15000}"
+                browser.evaluate(f"{VIEWER}.hash = 'view={place},{scale}'")
             largest = max(largest, memory_bytes() - before)
-        result = {
+        return {
             "first_s": first["first"] / 1000,
             "whole_s": first["milliseconds"] / 1000,
             "requests": first["requests"],
             "memory_mb": largest / 1e6,
             "empty_browser_mb": before / 1e6,
             "drags": frames,
-            "tiles_mb": page.evaluate(f"{VIEWER}.cacheBytes") / 1e6,
+            "tiles_mb": browser.evaluate(f"{VIEWER}.cacheBytes") / 1e6,
         }
-        browser.close()
-    return result
 
 
 def write_large(folder: Path) -> Path:

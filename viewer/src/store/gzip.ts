@@ -24,14 +24,19 @@ class Gzip {
     if (size === 0 || size > LARGEST) throw new Error("Failed to decode gzip");
     const result = new Uint8Array(size);
     let filled = 0;
-    const packed = new Response(bytes as BodyInit).body!;
-    const reader = packed.pipeThrough(new DecompressionStream("gzip")).getReader();
+    const gzip = new DecompressionStream("gzip");
+    // Not through a Response, whose copy of the bytes stays until the garbage collector comes by.
+    const writer = gzip.writable.getWriter();
+    const written = Promise.all([writer.write(bytes as BufferSource), writer.close()]);
+    written.catch(() => {}); // of a damaged file the reader hears too
+    const reader = gzip.readable.getReader();
     for (let piece = await reader.read(); !piece.done; piece = await reader.read()) {
       if (filled + piece.value.byteLength > size) throw new Error("Failed to decode gzip");
       result.set(piece.value, filled);
       filled += piece.value.byteLength;
       release(piece.value);
     }
+    await written;
     if (filled !== size) throw new Error("Failed to decode gzip");
     return result;
   }
