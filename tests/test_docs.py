@@ -114,10 +114,11 @@ def test_each_public_class_is_documented(name):
 def cited():
     """Return every key cited in the source, and where."""
     found = {}
-    for path in [*(ROOT / "src").rglob("*.py"), *(ROOT / "core" / "src").rglob("*.rs"), *PAGES]:
+    shaders = (ROOT / "viewer" / "src").rglob("*.ts")
+    for path in [*(ROOT / "src").rglob("*.py"), *(ROOT / "core" / "src").rglob("*.rs"), *shaders, *PAGES]:
         if path.name == "references.md":
             continue
-        pattern = r"\[([A-Z][\w.:-]*\d)\]_?" if path.suffix == ".rs" else r"\[([A-Z][\w.:-]*)\]_"
+        pattern = r"\[([A-Z][\w.:-]*\d)\]_?" if path.suffix in (".rs", ".ts") else r"\[([A-Z][\w.:-]*)\]_"
         for key in re.findall(pattern, path.read_text(encoding="utf-8")):
             found.setdefault(key, path.relative_to(ROOT))
     for spec in impasto.models.MODELS.values():

@@ -92,14 +92,11 @@ def test_rendered_in_memory_is_what_the_command_writes(published, tmp_path):
 @pytest.mark.parametrize("model", MODELS)
 def test_the_page_draws_what_the_core_renders(model, published, page):
     lights, shown = random_lights(sum(map(ord, model)))
-    # The ambient and the residual term are the same lines of the shader for all models; a few lights tell
-    # whether they are there, and all of them for one model that they are right.
-    count = 3 if "ambient" in model and model != "torrance-sparrow-ambient" else LIGHTS
     view = {"x": WIDTH / 2, "y": HEIGHT / 2, "scale": 1}
     page.evaluate("hash => { document.querySelector('impasto-viewer').hash = hash }", f"model={model}")
     complete(page)
-    states = [{"lights": [light], "view": view} for light in shown[:count]]
-    expected = rendered(published / "painting.zarr", model, lights.select(slice(0, count)))
+    states = [{"lights": [light], "view": view} for light in shown]
+    expected = rendered(published / "painting.zarr", model, lights)
     differences = []
     for want, got in zip(expected, pictures(page, states), strict=True):
         assert want.shape == got.shape == (HEIGHT, WIDTH, 3)
