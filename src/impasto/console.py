@@ -43,11 +43,17 @@ class Report:
     ----------
     command : str
         The subcommand.
+
+    Attributes
+    ----------
+    exit_code : int
+        What the subcommand ends with if nothing fails.
     """
 
     def __init__(self, command: str) -> None:
         self.command = command
         self.data: dict[str, Any] = {}
+        self.exit_code = 0
 
     def say(self, text: str = "") -> None:
         """Print a line of the result."""
@@ -104,6 +110,7 @@ def reporting(command: str, json_file: Path | None = None, debug: bool = False) 
         raise typer.Exit(EXIT_PROBLEM)
     try:
         yield report
+        code = report.exit_code
     except KeyboardInterrupt:
         code = EXIT_INTERRUPTED
         typer.echo(

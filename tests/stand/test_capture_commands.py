@@ -1,6 +1,8 @@
 """The commands at the stand, as a person types them."""
 
 import json
+import os
+import pty
 import subprocess
 import sys
 
@@ -46,6 +48,20 @@ def test_nobody_at_the_terminal_is_an_error_before_anything_is_written(tmp_path)
     assert result.exit_code == 1
     assert "no terminal" in result.output
     assert not (tmp_path / "photos").exists()
+
+
+def test_whoever_stops_a_capture_stops_a_script_too(tmp_path):
+    plan, photos = tmp_path / "plan.toml", tmp_path / "photos"
+    run("capture", "plan", plan, "--arm", "0,10,10", "--camera", "simulated", "--light", "hand")
+    terminal, typed_at = pty.openpty()
+    os.write(terminal, b"s\n")
+    program = "from impasto.cli.commands import app; app()"
+    command = [sys.executable, "-c", program, "capture", "run", plan, photos]
+    done = subprocess.run(command, stdin=typed_at, capture_output=True, text=True, timeout=60)
+    os.close(terminal)
+    os.close(typed_at)
+    assert done.returncode == 130, done.stdout + done.stderr
+    assert "is not complete; run the same command again to go on" in done.stdout
 
 
 def test_a_step_that_leads_nowhere_is_an_error(tmp_path):

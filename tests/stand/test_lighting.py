@@ -68,6 +68,24 @@ def test_a_cap_that_is_forgotten_is_named(tmp_path):
     assert any("dark frame reads 13.7% of full scale" in line for line in said)
 
 
+def test_photographs_without_a_lamp_are_checked_afterwards_too(tmp_path):
+    from test_faults import altered
+
+    photos = tmp_path / "photos"
+    path = write_plan(tmp_path, times=(1,), calibration=("dark", "ambient", "white"))
+    stand.run(path, photos, say=quiet)
+    assert stand.check(photos).findings == ()
+    for name in ("dark", "ambient-after", "white"):
+        brighter = 65535 if name == "white" else 3000
+        altered(lambda image, by=brighter: image + by)(photos / "calibration" / f"{name}.tif")
+    found = stand.check(photos).findings
+    assert {(finding.check, *finding.photographs) for finding in found} == {
+        ("dark", "calibration/dark"),
+        ("ambient", "calibration/ambient-after"),
+        ("clipped", "calibration/white"),
+    }
+
+
 def test_few_lights_leave_narrow_highlights_uncovered_and_many_cover_them(tmp_path):
     """A glossy sample under lamps 12° and 4° apart, fitted coarsely."""
     found = {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -23,6 +23,9 @@ from impasto.stand.look import Look, look_at
 from impasto.stand.plan_file import Limits
 from impasto.stand.steps import CALIBRATION, Shot
 
+# What lies in the folder of calibration shots under names that begin so, as a plan calls them.
+_BESIDES = ("dark", "ambient", "white", "grey-scale", "colour")
+
 
 @dataclass(frozen=True)
 class CheckedCapture:
@@ -32,7 +35,7 @@ class CheckedCapture:
     ----------
     folder : Path
     photographs : int
-        Looked at, further exposures among them.
+        Of the painting, further exposures among them.
     names : tuple of str, length L
         The longest exposures.
     clipped : ndarray of shape (L,)
@@ -65,7 +68,8 @@ def check(
     Parameters
     ----------
     folder : path
-        As `impasto stack` reads it; spheres in ``calibration/spheres`` are looked at too.
+        As `impasto stack` reads it. In ``calibration`` the spheres and what is named ``dark``, ``ambient``,
+        ``white``, ``grey-scale`` or ``colour`` are looked at too.
     lights : path, optional
         Light file; found in the folder if it is the only one.
     limits : Limits, optional
@@ -107,9 +111,19 @@ def check(
                     longest[shot] = look.thinned()
                 judge.accept(shot, look)
             advance(1)
-    raise_problems(CaptureError, broken)
     # Now that all are known, each is compared with those under the lamps nearest to its own.
     findings += [finding for shot, look in longest.items() for finding in judge.judge(shot, look)]
+    for kind, path in _besides(Path(folder)):
+        try:
+            look = look_at(path, None, capture.clip_level)
+        except CaptureError as error:
+            broken += error.problems
+        else:
+            time = _relative_time(look, list(longest.values()))
+            shot = Shot(f"{CALIBRATION}/{path.stem}", kind, None, time, 0, True)
+            findings += judge.judge(shot, look)
+            judge.accept(shot, look)
+    raise_problems(CaptureError, broken)
     return CheckedCapture(
         folder=Path(folder),
         photographs=len(taken),
@@ -128,6 +142,22 @@ def _shot(capture: Capture, place: str, group: Sequence[Exposure], number: int) 
     except ValueError:  # the light file lies elsewhere
         name = Path(path.stem)
     return Shot(name.as_posix(), "painting", place, group[number].time, number, number == len(group) - 1)
+
+
+def _besides(folder: Path) -> Iterator[tuple[str, Path]]:
+    """Yield what is in the photographs beside the painting's, and these."""
+    place = folder / CALIBRATION
+    for path in find_photographs(place) if place.is_dir() else ():
+        for kind in _BESIDES:
+            if path.stem == kind or path.stem.startswith((f"{kind}-", f"{kind}_")):
+                yield kind, path
+
+
+def _relative_time(look: Look, longest: Sequence[Look]) -> float:
+    """Return the exposure time relative to the painting's longest, 1 where the files do not say."""
+    own, others = look.photograph.exposure_s, [other.photograph.exposure_s for other in longest]
+    known = [time for time in others if time]
+    return own / float(np.median(known)) if own and known else 1.0
 
 
 def _spheres(folder: Path, capture: Capture) -> list[Finding]:

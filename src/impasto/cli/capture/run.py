@@ -10,7 +10,7 @@ import typer
 from impasto import stand
 from impasto.cli.app import Debug, Json
 from impasto.cli.capture import commands
-from impasto.console import reporting
+from impasto.console import EXIT_INTERRUPTED, reporting
 
 
 @commands.command(epilog="Example: impasto capture run plan.toml photos/ --page")
@@ -48,4 +48,6 @@ def run(
         report.say_all(run_lines(summary))
         if summary.complete:
             report.say(f"next: impasto stack {out} painting.zarr")
+        else:
+            report.exit_code = EXIT_INTERRUPTED  # what follows in a script needs all photographs
         report.done(summary)
