@@ -11,7 +11,7 @@ use crate::observations::{Group, Stack};
 use crate::record::{FitBlock, Layout, Row, Status, groups};
 use crate::robust::Loss;
 use crate::separable::{Point, Scratch, Separable, Solution, propagated};
-use crate::start::{ASIDE, Grey, aside, candidates, doubt_shadows, grey, start, start_at, starts};
+use crate::start::{ASIDE, Grey, aside, candidates, doubt_shadows, grey, start, start_at, starts, wider_start};
 use std::marker::PhantomData;
 
 /// Rounds of a robust fit with a wider loss before the one with the loss asked for.
@@ -111,7 +111,8 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
         problem.prior = known.is_none();
         let mut begin = match (known, self.across) {
             (Some(normal), _) => {
-                let points = starts::<M, ISA, L>().map(|coordinates| Point { normal, coordinates });
+                let shapes = starts::<M, ISA, L>().chain(wider_start::<M, ISA, L>());
+                let points = shapes.map(|coordinates| Point { normal, coordinates });
                 explore(&mut problem, points, wanted)
             }
             (None, Some(across)) => {

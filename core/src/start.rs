@@ -295,6 +295,18 @@ pub fn starts<M: Model<L>, const ISA: Isa, const L: usize>() -> impl Iterator<It
     })
 }
 
+/// The coordinates of the last of these shapes, moved half-way to the bound of the first: lobes so broad that only a search
+/// which has time to lose should try them.
+#[inline(always)]
+pub fn wider_start<M: Model<L>, const ISA: Isa, const L: usize>() -> Option<[Lane<ISA>; MAX_SHAPE]> {
+    let mut coordinates = starts::<M, ISA, L>().last()?;
+    if M::SHAPE.is_empty() {
+        return None;
+    }
+    coordinates[0] = (coordinates[0] + Lane::splat(M::coordinate(0).upper)) * Lane::splat(0.5);
+    Some(coordinates)
+}
+
 #[inline(always)]
 fn product<const ISA: Isa, const N: usize>(a: &[Lane<ISA>; N], b: &[Lane<ISA>; N]) -> Lane<ISA> {
     let mut sum = Lane::splat(0.0);
