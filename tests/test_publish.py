@@ -145,6 +145,13 @@ def test_xarray_and_zarr_read_it_without_impasto(site):
     np.testing.assert_allclose(value, whole(published)["diffuse"][..., 0], rtol=1e-5)
 
 
+def test_the_page_is_small(site):
+    """All that is published beside the painting, codecs included."""
+    files = [path for path in site.rglob("*") if path.is_file() and "painting.zarr" not in path.parts]
+    assert (site / "index.html") in files
+    assert sum(len(gzip.compress(path.read_bytes())) for path in files) < 300_000
+
+
 def test_photographs_are_published_with_their_lights(painting, site):
     root = zarr.open_group(site / "painting.zarr", mode="r")
     kept = root.attrs["photographs"]
