@@ -17,8 +17,9 @@ class _Photographs(PhotographsTable):
     brackets: list[str] = Field(default_factory=list)
 
 
-class _Light(Table):
-    file: str
+class LampTable(Table):
+    """Where a lamp stands, in one of four ways, and how strong it is."""
+
     direction: list[float] | None = None
     arm_angle_deg: float | None = None
     zenith_deg: float | None = None
@@ -26,12 +27,33 @@ class _Light(Table):
     position_mm: list[float] | None = None
     gain: list[float] = Field([1.0], min_length=1)
     angular_size_deg: float = float("nan")
-    exposure_s: float | None = None
 
     @field_validator("gain", mode="before")
     @classmethod
     def _one_or_per_channel(cls, value: Any) -> Any:
         return [value] if isinstance(value, int | float) else value
+
+    def row(self, where: str, file: str, exposure_s: float | None = None) -> LightRow:
+        """Return the lamp as the light of a photograph.
+
+        Raises
+        ------
+        ValueError
+            If its place is given in no way or in several.
+        """
+        direction, position = place(
+            direction=self.direction,
+            arm_angle_deg=self.arm_angle_deg,
+            zenith_deg=self.zenith_deg,
+            azimuth_deg=self.azimuth_deg,
+            position_mm=self.position_mm,
+        )
+        return LightRow(where, file, direction, position, tuple(self.gain), self.angular_size_deg, exposure_s)
+
+
+class _Light(LampTable):
+    file: str
+    exposure_s: float | None = None
 
 
 class _Manifest(Table):
@@ -107,24 +129,6 @@ def _take_camera(file: LightFile, table: CameraTable) -> None:
 
 def _take_light(file: LightFile, light: _Light, where: str) -> None:
     try:
-        direction, position = place(
-            direction=light.direction,
-            arm_angle_deg=light.arm_angle_deg,
-            zenith_deg=light.zenith_deg,
-            azimuth_deg=light.azimuth_deg,
-            position_mm=light.position_mm,
-        )
+        file.rows.append(light.row(where, light.file, light.exposure_s))
     except ValueError as error:
         file.problems.append(Problem(where, str(error), "Correct this light"))
-        return
-    file.rows.append(
-        LightRow(
-            where,
-            light.file,
-            direction,
-            position,
-            tuple(light.gain),
-            light.angular_size_deg,
-            light.exposure_s,
-        )
-    )

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError, field_validator
+from pydantic import Field, ValidationError
 
 from impasto.capture.lights import LightRow, check_rows, make_lights
-from impasto.capture.lights import place as place_light
+from impasto.capture.lights_toml import LampTable
 from impasto.capture.toml_tables import (
     CameraTable,
     NotNegative,
@@ -88,42 +88,16 @@ class Calibration(Table):
     after: bool = False
 
 
-class PlacePlan(Table):
-    """Where a lamp stands: one of ``[[place]]``, in the order in which they are lit."""
+class PlacePlan(LampTable):
+    """One of ``[[place]]``, in the order in which they are lit."""
 
     name: _Name
-    direction: list[float] | None = None
-    arm_angle_deg: float | None = None
-    zenith_deg: float | None = None
-    azimuth_deg: float | None = None
-    position_mm: list[float] | None = None
-    gain: list[float] = Field([1.0], min_length=1)
-    angular_size_deg: float = float("nan")
     times_s: list[Positive] = Field(default_factory=list, max_length=9)
     dmx_channel: Annotated[int, Field(ge=1, le=512)] | None = None
 
-    @field_validator("gain", mode="before")
-    @classmethod
-    def _one_or_per_channel(cls, value: Any) -> Any:
-        return [value] if isinstance(value, int | float) else value
-
-    def row(self, file: str) -> LightRow:
-        """Return the light as a light file gives it.
-
-        Raises
-        ------
-        ValueError
-            If it is given in no way or in several.
-        """
-        direction, position = place_light(
-            direction=self.direction,
-            arm_angle_deg=self.arm_angle_deg,
-            zenith_deg=self.zenith_deg,
-            azimuth_deg=self.azimuth_deg,
-            position_mm=self.position_mm,
-        )
-        where = f"place {self.name}"
-        return LightRow(where, file, direction, position, tuple(self.gain), self.angular_size_deg)
+    def light(self) -> LightRow:
+        """Return the place as the light of its photograph; see `LampTable.row`."""
+        return self.row(f"place {self.name}", self.name)
 
 
 class PlanFile(Table):
@@ -252,7 +226,7 @@ def _lights(file: PlanFile, name: str) -> tuple[Lights | None, list[Problem]]:
     rows, problems = [], []
     for place in file.place:
         try:
-            rows.append(place.row(place.name))
+            rows.append(place.light())
         except ValueError as error:
             problems.append(Problem(f"{name} place {place.name}", str(error), "Correct this place"))
     problems += check_rows(rows, None)[0]

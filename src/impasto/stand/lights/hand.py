@@ -50,6 +50,6 @@ def where(place: PlacePlan) -> str:
         return f"x {x:g}, y {y:g}, z {z:g} mm ({place.name})"
     import math
 
-    zenith, azimuth = zenith_azimuth(place.row(place.name).direction)
+    zenith, azimuth = zenith_azimuth(place.light().direction)
     high, around = math.degrees(float(zenith)), math.degrees(float(azimuth)) % 360
     return f"{high:.0f}° from the normal, {around:.0f}° around ({place.name})"

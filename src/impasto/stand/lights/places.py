@@ -47,7 +47,7 @@ def placeholder_problem(text: str, places: Sequence[PlacePlan], where: str) -> N
 
 
 def _values(place: PlacePlan) -> dict[str, float | int | str]:
-    direction, position = place.row(place.name).direction, place.position_mm
+    direction, position = place.light().direction, place.position_mm
     zenith, azimuth = (math.degrees(float(angle)) for angle in zenith_azimuth(direction))
     x, y, z = position or direction
     values = {
