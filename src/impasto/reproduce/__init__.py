@@ -14,6 +14,7 @@ from impasto.console import versions
 from impasto.errors import OptionError, OutputError, Problem, raise_problems
 from impasto.output import prepare_folder
 from impasto.page import Page, Picture
+from impasto.reproduce.camera import SHORTER_EXPOSURES, CalibratedCamera, calibrate_camera
 from impasto.reproduce.printed import PRINTED
 from impasto.reproduce.sample import PROCEDURES, VirtualSample, enact
 from impasto.reproduce.tables import findings, tables
@@ -41,6 +42,7 @@ class ReproduceSummary:
     Parameters
     ----------
     out, page : Path
+    camera : CalibratedCamera
     samples : dict of str to VirtualSample
     findings : tuple of str
         What agrees with the paper and what does not.
@@ -49,6 +51,7 @@ class ReproduceSummary:
 
     out: Path
     page: Path
+    camera: CalibratedCamera
     samples: dict[str, VirtualSample]
     findings: tuple[str, ...]
     seconds: float
@@ -67,7 +70,8 @@ def reproduce(
     """Re-enact the paper's experiment on virtual samples, and set its printed values beside what comes out.
 
     Each sample is a measured material, so the truth is none of the models that are fitted, photographed under
-    37 lights on an arm with merged exposures. Both models are fitted by the paper's procedure, by its refined
+    37 lights on an arm by a camera whose response is measured from a grey scale, with merged exposures. Both
+    models are fitted by the paper's procedure, by its refined
     form, and by the joint one.
 
     Parameters
@@ -119,15 +123,17 @@ def reproduce(
     for name in samples:
         materials.radiance_factor(SAMPLES[name].measured)  # raises for a material that is not there
     prepare_folder(folder)
+    camera = calibrate_camera(folder / "camera", seed=seed, show_progress=show_progress)
     enacted = {}
     for name in samples:
         enacted[name] = enact(
-            folder / name, name, materials, size=size, seed=seed, show_progress=show_progress
+            folder / name, name, materials, camera, size=size, seed=seed, show_progress=show_progress
         )
         say(f"sample {name}: {enacted[name].material}, {enacted[name].support}")
     summary = ReproduceSummary(
         out=folder,
         page=folder / "index.html",
+        camera=camera,
         samples=enacted,
         findings=tuple(findings(enacted)),
         seconds=time.perf_counter() - started,
@@ -142,6 +148,23 @@ def _write_page(summary: ReproduceSummary, size: tuple[int, int]) -> None:
         f"{len(summary.samples)} virtual samples of {size[0]} x {size[1]} pixels, made of measured "
         "materials, under the paper's arm: its models, its procedure, its tables, and what a joint fit says.",
         contents=True,
+    )
+    response = summary.camera.response
+    part = page.section("Camera")
+    part.text(
+        f"Its response was measured from a grey scale over {response.decades:.2f} decades of radiance, to "
+        f"{response.residual:.2%}, and is undone in every photograph; {1 + SHORTER_EXPOSURES} exposures "
+        "each, two stops apart, are merged; a white card gives the scale."
+    )
+    part.pictures(
+        [
+            Picture(
+                response.plot.read_bytes(),
+                "The measured response",
+                alt="Radiance against code, a curve per channel, with the patches of the grey scale on them.",
+            )
+        ],
+        columns=1,
     )
     part = page.section("What agrees")
     part.items(summary.findings)

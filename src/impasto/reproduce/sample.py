@@ -23,6 +23,7 @@ from impasto.evaluate.tally import ModelComparison
 from impasto.fit import FitOptions, fit
 from impasto.geometry import Array
 from impasto.pixels import luminance
+from impasto.reproduce.camera import RESPONSE, SHORTER_EXPOSURES, CalibratedCamera
 from impasto.stack import stack
 from impasto.store import open_fit
 
@@ -92,6 +93,7 @@ def enact(
     folder: Path,
     name: str,
     measured: MeasuredSet,
+    camera: CalibratedCamera,
     *,
     size: tuple[int, int],
     seed: int,
@@ -105,6 +107,7 @@ def enact(
         Where the photographs, the stores and the plots go.
     name : str
     measured : MeasuredSet
+    camera : CalibratedCamera
     size : tuple of int
         Width and height, pixels.
     seed : int
@@ -118,7 +121,8 @@ def enact(
         seed=seed,
         measured=measured.path,
         angular_size_deg=LAMP_DEG,
-        format="exr",
+        response=RESPONSE,
+        brackets=SHORTER_EXPOSURES,
         calibration=False,
         show_progress=show_progress,
     )
@@ -126,7 +130,14 @@ def enact(
     peak = (0, 0)
     for procedure, (how, options) in PROCEDURES.items():
         store = folder / f"{procedure}.zarr"
-        stack(folder / "photos", store, show_progress=show_progress)
+        stack(
+            folder / "photos",
+            store,
+            brackets=sorted((folder / "photos" / "brackets").iterdir()),
+            oecf=camera.response.file,
+            white=camera.white,
+            show_progress=show_progress,
+        )
         said: list[str] = []
         fit(
             store,
