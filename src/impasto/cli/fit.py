@@ -84,6 +84,13 @@ def fit(
             show_default=False,
         ),
     ] = FitOptions.self_calibrate,
+    calibrate_directions: Annotated[
+        bool,
+        typer.Option(
+            "--calibrate-directions/--keep-directions",
+            help="Whether self-calibration may correct the lights' directions.",
+        ),
+    ] = FitOptions.calibrate_directions,
     exclude: Annotated[
         list[str] | None,
         typer.Option("--exclude", metavar="NAME", help="Photograph to leave out; may be repeated."),
@@ -107,6 +114,7 @@ def fit(
             residual=residual,
             residual_components=residual_components,
             self_calibrate=self_calibrate,
+            calibrate_directions=calibrate_directions,
         )
         more: dict[str, Any] = {"models": tuple(model)} if model else {}
         summary = impasto.fit(

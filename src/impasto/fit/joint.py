@@ -13,13 +13,23 @@ from impasto import store as stores
 from impasto.arm import find_arm
 from impasto.errors import OptionError, Problem, raise_problems
 from impasto.fit.procedure import Findings, FitOptions
-from impasto.fit.remainder import Remainder, find_remainder, in_blocks, left_over, usual_toe
+from impasto.fit.remainder import (
+    Remainder,
+    find_remainder,
+    in_blocks,
+    left_out_db,
+    left_over,
+    usual_toe,
+)
 from impasto.fit.sample import Sample, sample_pixels
 from impasto.fit.self_calibration import Calibration, self_calibrate
 from impasto.fit.tile import fit_tile
 from impasto.geometry import Lights, position_mm
 from impasto.models import ModelSpec
 from impasto.pixels import Pixels, pixels_of_maps, render_pixels
+
+# Enough, because what limits the directions is the model's error, not the noise.
+_DIRECTION_PIXELS = 2000
 
 _FOREIGN = {"refined": "paper", "threshold_deg": "paper", "highlight": "paper"}
 
@@ -108,15 +118,20 @@ class Joint:
             )
         if self._options.residual or self._options.calibrates:
             sample = _SampledPixels(self, sample_pixels(self._stack, self.lights, show_progress))
-            toe = usual_toe(sample.measured())
+            toe = sample.toe
             if self._options.calibrates:
-                calibration = self_calibrate(sample, self._selected)
+                calibration = self_calibrate(
+                    sample,
+                    sample.thinned(_DIRECTION_PIXELS),
+                    self._selected,
+                    directions=self._options.calibrate_directions,
+                )
                 self._selected = calibration.lights
                 attributes["self_calibration"] = calibration.attributes()
                 notes += _calibration_notes(calibration)
             if self._options.residual:
                 self._remainder = find_remainder(
-                    sample.left_over(self._selected, toe),
+                    sample.left_over(self._selected),
                     self._selected,
                     toe,
                     self._options.residual_components,
@@ -214,14 +229,38 @@ class _SampledPixels:
     def clipped(self) -> NDArray[np.bool_]:
         return self.procedure.clipped(self.measured())
 
-    def left_over(self, lights: Lights, toe: float) -> NDArray[np.float32]:
+    @property
+    def toe(self) -> float:
+        return usual_toe(self.measured())
+
+    def left_over(self, lights: Lights) -> NDArray[np.float32]:
         pixels = self.procedure.pixels(self.fit(lights), self.sample.row, self.sample.column)
-        return self.procedure.left_over(self.sample.values, pixels, lights, toe)
+        return self.procedure.left_over(self.sample.values, pixels, lights, self.toe)
+
+    def left_out_db(self, lights: Lights) -> float:
+        return left_out_db(self.left_over(lights), lights)
+
+    def thinned(self, count: int) -> _SampledPixels:
+        """Return about `count` of the pixels, or all of fewer."""
+        whole = self.sample
+        every = np.linspace(0, len(whole.row) - 1, min(count, len(whole.row))).astype(np.intp)
+        part = Sample(np.ascontiguousarray(whole.values[:, every]), whole.row[every], whole.column[every])
+        return _SampledPixels(self.procedure, part)
 
 
 def _calibration_notes(found: Calibration) -> tuple[str, ...]:
     departure = 100 * np.abs(np.exp(np.log(found.gain / found.trend).mean(axis=1)) - 1)
+    directions: tuple[str, ...] = ()
+    if found.directions:
+        error = found.directions["left_out_db"]
+        turned = np.array(found.directions["turned_deg"])
+        directions = (
+            f"self-calibration: directions turned by {_rms(turned):.2f}° (rms), {turned.max():.1f}° at most, "
+            f"meet lights left out to {error['corrected']:.2f} dB, the stated ones to {error['stated']:.2f} "
+            f"dB: {'the turned ones are used' if found.directions['used'] else 'the stated ones stay'}",
+        )
     return (
+        *directions,
         "self-calibration: the strengths of the lights depart from their trend over direction by "
         f"{_rms(departure):.1f} % (rms), {departure.max():.0f} % at most. The attribute "
         "self_calibration lists them; --no-self-calibrate takes the lights as stated",

@@ -50,6 +50,8 @@ class FitOptions:
     self_calibrate : bool or None
         Whether the joint procedure finds the strength of each light from the photographs; None for where it
         describes the residual.
+    calibrate_directions : bool
+        Whether it may then correct the lights' directions too, where that is borne out by lights left out.
     """
 
     index: float = 1.5
@@ -65,6 +67,7 @@ class FitOptions:
     residual: bool = False
     residual_components: int = 18
     self_calibrate: bool | None = None
+    calibrate_directions: bool = True
 
     @property
     def calibrates(self) -> bool:

@@ -93,10 +93,8 @@ def find_remainder(rest: Values, lights: Lights, toe: float, components: int) ->
     components : int
         How many coefficients a pixel may have.
     """
-    count, pixels, channels = rest.shape
-    samples = rest.transpose(1, 0, 2).reshape(pixels, -1).astype(np.float64)
-    flat = samples.T @ samples / pixels
-    moments = flat.reshape(count, channels, count, channels)
+    count, _, channels = rest.shape
+    samples, moments = _moments(rest)
     per_light = np.trace(moments, axis1=1, axis2=3) / channels
     process = choose_process(lights.direction, per_light)
     hull = hull_of(lights.direction)
@@ -108,9 +106,6 @@ def find_remainder(rest: Values, lights: Lights, toe: float, components: int) ->
     largest = np.abs(samples @ linear.T).max(axis=0)
     step = np.array([float(f"{value:.7g}") for value in np.maximum(_HEADROOM * largest / ZERO, 1e-12)])
     encoder = (linear / step[:, None]).astype(np.float32)
-
-    def decibels(errors: Array) -> float:
-        return round(float(-10.0 * np.log10(errors + 1e-12).mean()), 3)
 
     attributes = {
         "components": len(step),
@@ -125,11 +120,37 @@ def find_remainder(rest: Values, lights: Lights, toe: float, components: int) ->
         "fade": round(float(np.sin(np.radians(FADE_DEG))), 7),
         "kept": round(found.kept, 5),
         "left_out_db": {
-            "model": decibels(np.diag(per_light)),
-            "with_residual": decibels(process.left_out(per_light)),
+            "model": _decibels(np.diag(per_light)),
+            "with_residual": _decibels(process.left_out(per_light)),
         },
     }
     return Remainder(encoder, toe, attributes)
+
+
+def left_out_db(rest: Values, lights: Lights) -> float:
+    """Return to how many decibels lights left out one by one are met, by model and process together.
+
+    Parameters
+    ----------
+    rest : ndarray of shape (L, N, C), float32
+        What is left over at a sample; see `left_over`.
+    lights : Lights
+    """
+    _, moments = _moments(rest)
+    per_light = np.trace(moments, axis1=1, axis2=3) / rest.shape[2]
+    return _decibels(choose_process(lights.direction, per_light).left_out(per_light))
+
+
+def _moments(rest: Values) -> tuple[Array, Array]:
+    """Return samples (N, L * C) of what is left over, and their second moments (L, C, L, C)."""
+    count, pixels, channels = rest.shape
+    samples = rest.transpose(1, 0, 2).reshape(pixels, -1).astype(np.float64)
+    moments = (samples.T @ samples / pixels).reshape(count, channels, count, channels)
+    return samples, moments
+
+
+def _decibels(errors: Array) -> float:
+    return round(float(-10.0 * np.log10(errors + 1e-12).mean()), 3)
 
 
 def in_blocks(count: int, compute: Callable[[slice], NDArray[np.uint16]]) -> NDArray[np.uint16]:

@@ -1,15 +1,20 @@
-"""How strong each light was, as far as the photographs themselves tell it."""
+"""How strong each light was, and where it stood, as far as the photographs themselves tell it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from impasto import store as stores
+from impasto.arm import find_arm
+from impasto.fit.light_directions import MIN_LIGHTS, correct_directions
 from impasto.geometry import Array, Lights
+
+WORTH_DB = 0.1
+"""How much closer lights left out have to be met for corrected directions to be used."""
 
 # Rounds of fitting the pixels and then the lights; the strengths change by less than 1 % in the last.
 _ROUNDS = 3
@@ -32,6 +37,9 @@ class PixelFit(Protocol):
     def clipped(self) -> NDArray[np.bool_]:
         """Return which samples (L, N, C) are clipped."""
 
+    def left_out_db(self, lights: Lights) -> float:
+        """Return to how many decibels lights left out one by one are met; see `remainder.left_out_db`."""
+
 
 @dataclass(frozen=True)
 class Calibration:
@@ -40,27 +48,59 @@ class Calibration:
     Parameters
     ----------
     lights : Lights
-        As they are to be used: with the strengths' departures from their trend.
+        As they are to be used: with the strengths' departures from their trend, and the directions found.
     gain : ndarray of shape (L, C)
         Strength found over strength stated, of median 1.
     trend : ndarray of shape (L, C)
         The part of it that changes smoothly with direction, and is left in the photographs: a painting that
         is brighter under all lights from one side cannot be told from lights that are stronger there.
+    directions : dict
+        Whether corrected directions are used, and why; empty where none were sought.
     """
 
     lights: Lights
     gain: Array
     trend: Array
+    directions: dict[str, Any] = field(default_factory=dict)
 
     def attributes(self) -> dict[str, Any]:
         """Return what was found, for the attributes of a fit."""
         return {
             "gain": np.round(self.gain, 5).tolist(),
             "trend": np.round(self.trend, 5).tolist(),
+            **({"directions": self.directions} if self.directions else {}),
         }
 
 
-def self_calibrate(pixels: PixelFit, lights: Lights) -> Calibration:
+def self_calibrate(pixels: PixelFit, thinned: PixelFit, lights: Lights, *, directions: bool) -> Calibration:
+    """Estimate strength and direction of each light from the photographs.
+
+    Parameters
+    ----------
+    pixels, thinned : PixelFit
+        A sample of the painting, and fewer pixels of it, which are enough for the directions.
+    lights : Lights
+        As stated.
+    directions : bool
+        Whether directions may be corrected. They are where lights left out one by one are then met closer by
+        `WORTH_DB`, and where the lights are enough to tell them.
+    """
+    stated = find_strengths(pixels, lights)
+    if not directions or len(lights) < MIN_LIGHTS or find_arm(lights.direction).planar:
+        return stated
+    corrected = find_strengths(pixels, correct_directions(thinned, lights))
+    error = [pixels.left_out_db(found.lights) for found in (stated, corrected)]
+    cosine = np.sum(lights.direction * corrected.lights.direction, axis=1)
+    found = {
+        "used": error[1] - error[0] > WORTH_DB,
+        "left_out_db": {"stated": error[0], "corrected": error[1]},
+        "turned_deg": np.round(np.degrees(np.arccos(np.minimum(cosine, 1.0))), 3).tolist(),
+        "corrected": np.round(corrected.lights.direction, 6).tolist(),
+    }
+    return replace(corrected if found["used"] else stated, directions=found)
+
+
+def find_strengths(pixels: PixelFit, lights: Lights) -> Calibration:
     """Estimate the strength of each light together with the pixels, by alternating robust steps.
 
     Parameters

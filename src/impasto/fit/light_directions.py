@@ -1,0 +1,226 @@
+"""Where each light stood, as far as the photographs themselves tell it.
+
+A direction is told by the relief: a light further to the left brightens all slopes that face left. What is
+common to all pixels is no evidence, because a light's strength and what the model does not know of the
+material look alike there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impasto.geometry import Array, Lights, zenith_azimuth
+from impasto.residual import kernel
+
+if TYPE_CHECKING:
+    from impasto.fit.self_calibration import PixelFit
+
+# The directions change by less than 0.05 degrees after the third.
+_ROUNDS = 3
+_REWEIGHTINGS = 3
+_BLOCK = 256
+_STEP = np.radians(0.5)
+
+# Standard deviations of what is to be found, in radians; of the strengths' logarithm, which are found only
+# to be set aside, it is so wide that the photographs alone tell them.
+_DIRECTION_SD = np.radians(2.0)
+_STRENGTH_SD = 0.5
+
+# Of what all pixels share and the model does not know, per function: depending on the zenith angle alone, as
+# the fall-off of an unknown material does on a flat painting, or on the whole direction.
+_ZENITH_LENGTH = np.radians(15.0)
+_SHARED_LENGTH = 0.7
+_STRENGTH_SHARED_SD = (0.3, 0.1)
+_DIRECTION_SHARED_SD = (0.05, 0.03)
+
+# Of what a single pixel leaves over, in the logarithm: a smooth function of direction, and noise.
+_PIXEL_SD, _PIXEL_LENGTH = 0.4, 0.5
+_NOISE_SD = 0.05
+# A highlight is known to a few times its own strength only: what is wrong about it must not turn lights.
+_HIGHLIGHT_SD = 2.0
+# Samples further off than this factor are in a cast shadow, or not of the painting.
+_FURTHEST = 0.5
+
+MIN_LIGHTS = 24
+"""Fewer lights leave too little once each function that all pixels share is set aside."""
+
+
+@dataclass(frozen=True)
+class _Linearised:
+    """The logarithm of pixels' radiance around the current lights.
+
+    Parameters
+    ----------
+    rest : ndarray of shape (L, N)
+        Measured over modelled, in the logarithm; 0 where not usable.
+    slope : ndarray of shape (3, L, N)
+        Its change with a light's log strength and with the two angles of `_axes`.
+    linear : ndarray of shape (L, 4, N)
+        Its change with the pixel's own normal, albedo and ambient term.
+    variance : ndarray of shape (L, N)
+        Of the noise; very large where not usable.
+    """
+
+    rest: Array
+    slope: Array
+    linear: Array
+    variance: Array
+
+
+def correct_directions(pixels: PixelFit, lights: Lights) -> Lights:
+    """Return the lights with directions estimated together with strengths and pixels.
+
+    Parameters
+    ----------
+    pixels : PixelFit
+        A sample of the painting.
+    lights : Lights
+        As stated, at least `MIN_LIGHTS` that do not lie in one plane; their strengths are kept.
+
+    Notes
+    -----
+    Gauss-Newton steps for strengths and directions of all lights, the pixels' own unknowns eliminated as in
+    bundle adjustment [Triggs2000]_. A pixel's residuals over the lights are no white noise: what a model gets
+    wrong is smooth over direction, so they have the covariance of a Gaussian process, and only what departs
+    from neighbouring lights is evidence. Of the corrections found, the part is taken that the prior expects
+    of independent errors rather than of a function that all lights share. So are the ambiguities settled that
+    relief and lights have in common, such as a flatter relief under lights that stand lower
+    [Belhumeur1999]_.
+    """
+    prior, shared = _priors(lights.direction)
+    correction = np.zeros((3, len(lights)))
+    for _ in range(_ROUNDS):
+        current = _turned(lights, correction[1:])
+        current = replace(current, intensity=lights.intensity * np.exp(correction[0])[:, None])
+        found = _solve(_linearise(pixels, current, _axes(lights)), current, correction, prior)
+        independent = prior - shared
+        correction = np.reshape(independent @ np.linalg.solve(prior, found.ravel()), found.shape)
+        correction[0] -= np.median(correction[0])
+    return _turned(lights, correction[1:])
+
+
+def _axes(lights: Lights) -> Array:
+    """Return for each light the unit vectors of rising zenith and azimuth angle, shape (2, L, 3)."""
+    zenith, azimuth = zenith_azimuth(lights.direction)
+    down = [np.cos(zenith) * np.cos(azimuth), np.cos(zenith) * np.sin(azimuth), -np.sin(zenith)]
+    around = [-np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)]
+    return np.stack([np.stack(down, axis=1), np.stack(around, axis=1)])
+
+
+def _turned(lights: Lights, angle: Array, axes: Array | None = None) -> Lights:
+    """Return lights turned by small angles (2, L) along axes, by default their own."""
+    along = _axes(lights) if axes is None else axes
+    direction = lights.direction + np.einsum("kl,klx->lx", angle, along)
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    distance = np.linalg.norm(lights.position_mm, axis=1, keepdims=True)
+    return replace(lights, direction=direction, position_mm=direction * distance)
+
+
+def _priors(direction: Array) -> tuple[Array, Array]:
+    """Return the covariance (3L, 3L) of all corrections, and the part of it that lights share."""
+    count = len(direction)
+    zenith, _ = zenith_azimuth(direction)
+    along_zenith = np.exp(-np.square((zenith[:, None] - zenith) / _ZENITH_LENGTH) / 2)
+    anywhere = kernel(direction, direction, _SHARED_LENGTH)
+    zonal, whole = np.square(_STRENGTH_SHARED_SD)
+    zonal_turn, whole_turn = np.square(_DIRECTION_SHARED_SD)
+    shared, prior = np.zeros((2, 3, count, 3, count))
+    # The overall strength means nothing.
+    shared[0, :, 0] = zonal * along_zenith + whole * anywhere + 1.0
+    shared[1, :, 1] = zonal_turn * along_zenith + whole_turn * anywhere
+    shared[2, :, 2] = whole_turn * anywhere
+    for place, sd in enumerate((_STRENGTH_SD, _DIRECTION_SD, _DIRECTION_SD)):
+        prior[place, :, place] = shared[place, :, place] + sd**2 * np.eye(count)
+    return prior.reshape(3 * count, -1), shared.reshape(3 * count, -1)
+
+
+def _linearise(pixels: PixelFit, lights: Lights, axes: Array) -> _Linearised:
+    measured = pixels.measured().mean(axis=2, dtype=np.float64)
+    maps = pixels.fit(lights)
+
+    def render(under: Lights, which: dict[str, NDArray[np.generic]] = maps) -> Array:
+        mean: Array = pixels.radiance(which, under).mean(axis=2, dtype=np.float64)
+        return mean
+
+    radiance = render(lights)
+    matte = (
+        render(lights, {**maps, "specular": np.zeros_like(maps["specular"])})
+        if "specular" in maps
+        else radiance
+    )
+    floor = 0.05 * float(np.nanmean(measured))
+    usable = (measured > floor) & (radiance > floor) & ~pixels.clipped().any(axis=2)
+    slope = np.ones((3, *radiance.shape))
+    for axis in range(2):
+        angle = np.zeros((2, len(lights)))
+        angle[axis] = _STEP
+        sides = [render(_turned(lights, sign * angle, axes)) for sign in (1.0, -1.0)]
+        # Where a side is dark the pixel turns away from the light, and a logarithm has no slope.
+        usable &= (sides[0] > floor / 10) & (sides[1] > floor / 10)
+        high, low = np.where(usable, sides, 1.0)
+        slope[1 + axis] = np.log(high / low) / (2 * _STEP)
+    measured, radiance, matte = (np.where(usable, values, 1.0) for values in (measured, radiance, matte))
+    rest = np.log(measured / radiance)
+    usable &= np.abs(rest) < _FURTHEST
+    chosen = usable.mean(axis=0) > 0.6
+    usable, rest, radiance, measured = (
+        usable[:, chosen],
+        rest[:, chosen],
+        radiance[:, chosen],
+        measured[:, chosen],
+    )
+    highlight = 1.0 - matte[:, chosen] / radiance
+    variance = _NOISE_SD**2 + np.square(_HIGHLIGHT_SD * highlight) + np.square(0.1 * floor / measured)
+    # n·l and a constant, in units of the pixel's mean radiance.
+    terms = np.concatenate([lights.direction, np.ones((len(lights), 1))], axis=1)
+    return _Linearised(
+        rest=np.where(usable, rest, 0.0),
+        slope=np.where(usable, slope[:, :, chosen], 0.0),
+        linear=terms[:, :, None] * (radiance.mean(axis=0) / radiance)[:, None, :],
+        variance=np.where(usable, variance, 1e4),
+    )
+
+
+def _solve(around: _Linearised, lights: Lights, correction: Array, prior: Array) -> Array:
+    """Return the corrections (3, L), counted from the lights as stated, that the pixels tell."""
+    count, pixels = around.rest.shape
+    smooth = _PIXEL_SD**2 * kernel(lights.direction, lights.direction, _PIXEL_LENGTH)
+    target = around.rest + np.einsum("kl,klp->lp", correction, around.slope)
+    weight = np.ones_like(target)
+    found = correction
+    for _ in range(_REWEIGHTINGS):
+        normal = np.zeros((3, count, 3 * count))
+        right = np.zeros((3, count))
+        precisions = []
+        for first in range(0, pixels, _BLOCK):
+            part = slice(first, first + _BLOCK)
+            linear, slope = around.linear[:, :, part], around.slope[:, :, part].transpose(2, 0, 1)
+            covariance = np.einsum("lkp,mkp->plm", linear, linear) + smooth
+            diagonal = np.arange(count)
+            covariance[:, diagonal, diagonal] += (around.variance[:, part] / weight[:, part]).T
+            precision = np.linalg.inv(covariance)
+            precisions.append(precision)
+            projected = np.einsum("plm,pkm->plkm", precision, slope).reshape(len(precision), count, -1)
+            for kind in range(3):
+                normal[kind] += np.einsum("pl,plx->lx", slope[:, kind], projected)
+            right += np.einsum("pkl,plm,mp->kl", slope, precision, target[:, part], optimize=True)
+        matrix = normal.reshape(3 * count, -1) + np.linalg.inv(prior)
+        found = np.linalg.solve(matrix, right.ravel()).reshape(3, count)
+        error = target - np.einsum("kl,klp->lp", found, around.slope)
+        weight = _weights(error, precisions)
+    return found
+
+
+def _weights(error: Array, precisions: list[Array]) -> Array:
+    """Return Cauchy weights (L, N) by how far each sample is from what the pixel's others let expect."""
+    departures = []
+    for number, precision in enumerate(precisions):
+        part = error[:, number * _BLOCK : (number + 1) * _BLOCK]
+        own = np.sqrt(np.diagonal(precision, axis1=1, axis2=2).T)
+        departures.append(np.einsum("plm,mp->lp", precision, part) / own)
+    result: Array = 1.0 / (1.0 + np.square(np.concatenate(departures, axis=1) / 2.0))
+    return result
