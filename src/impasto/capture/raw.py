@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.capture.header import Header, UnreadableError
+from impasto.capture.mosaic import interpolate
 
 if TYPE_CHECKING:
     from rawpy import RawPy
@@ -34,6 +36,10 @@ _WORKING_HEIGHTS = 3
 _ORIENTATION = {0: 1, 3: 3, 5: 8, 6: 6}
 
 _COLOURS = b"RGBG"
+_SECOND_GREEN = 3
+
+# Looked through for saturated photosites at a time: few enough rows to stay in the processor's cache.
+_SLAB_ROWS = 64
 
 
 def read_header(path: Path) -> Header:
@@ -97,29 +103,58 @@ def bands(path: Path, header: Header, rows: int) -> Iterator[tuple[int, NDArray[
         try:
             if raw.raw_pattern is None:
                 raise _no_mosaic("pixels without a mosaic")
-            clipped = _clipped(raw, header.half_size)
-            image = raw.postprocess(
-                gamma=(1, 1),
-                no_auto_bright=True,
-                user_wb=[1.0, 1.0, 1.0, 1.0],
-                output_color=rawpy.ColorSpace.raw,
-                output_bps=16,
-                demosaic_algorithm=rawpy.DemosaicAlgorithm.LINEAR,
-                half_size=header.half_size,
-                user_flip=0,
-                # LibRaw would take the largest value of each photograph for its white.
-                adjust_maximum_thr=0.0,
-            )
+            saturated = _saturated(raw, header.half_size)
+            developed, pattern = _develop(raw, header.half_size)
         except rawpy.LibRawError as error:
             raise UnreadableError(f"cannot be decoded: {_reason(error)}") from error
-    if image.shape != (header.height, header.width, header.channels):
+    height, width = (side * (1 if pattern is None else 2) for side in developed.shape[:2])
+    if (height, width) != (header.height, header.width):
         raise UnreadableError(
-            f"decodes to {image.shape[1]} x {image.shape[0]} pixels, its header says "
-            f"{header.width} x {header.height}"
+            f"decodes to {width} x {height} pixels, its header says {header.width} x {header.height}"
         )
-    image[clipped] = _WHITE
-    for row0 in range(0, header.height, rows):
-        yield row0, image[row0 : row0 + rows]
+    for row0 in range(0, height, rows):
+        stop = min(row0 + rows, height)
+        band = developed[row0:stop] if pattern is None else interpolate(developed, pattern, slice(row0, stop))
+        _mark_clipped(band, row0, *saturated, reach=0 if header.half_size else 1)
+        yield row0, band
+
+
+def development(half_size: bool = False) -> dict[str, Any]:
+    """Return LibRaw's settings for linear values in the camera's own colours."""
+    import rawpy
+
+    return {
+        "gamma": (1, 1),
+        "no_auto_bright": True,
+        "user_wb": [1.0, 1.0, 1.0, 1.0],
+        "output_color": rawpy.ColorSpace.raw,
+        "output_bps": 16,
+        "demosaic_algorithm": rawpy.DemosaicAlgorithm.LINEAR,
+        "half_size": half_size,
+        "user_flip": 0,
+        # LibRaw would take the largest value of each photograph for its white.
+        "adjust_maximum_thr": 0.0,
+    }
+
+
+def _develop(raw: RawPy, half_size: bool) -> tuple[NDArray[np.uint16], NDArray[np.uint8] | None]:
+    """Take off the black level and stretch to the white level.
+
+    Returns
+    -------
+    developed : ndarray of shape (H, W, 3) or (H / 2, W / 2, 4), uint16
+        The photograph, or its cells of 2 x 2 photosites, which are left to be interpolated.
+    pattern : ndarray of shape (2, 2), uint8, or None
+        Which colour stands where in a cell.
+    """
+    repeats = raw.raw_pattern
+    pattern = raw.raw_colors_visible[:2, :2].copy()
+    bayer = repeats is not None and repeats.shape == (2, 2) and sorted(pattern.flat) == [0, 1, 2, 3]
+    if half_size or not bayer or raw.sizes.height % 2 or raw.sizes.width % 2:
+        return np.asarray(raw.postprocess(**development(half_size)), np.uint16), None
+    # At half size, LibRaw's four colours are the photosites themselves.
+    cells = raw.postprocess(**development(half_size=True), four_color_rgb=True)
+    return np.asarray(cells, np.uint16), pattern
 
 
 def _open(path: Path) -> RawPy:
@@ -144,37 +179,36 @@ def half_size(header: Header) -> Header:
     return replace(header, height=height, width=width, unit_rows=unit_rows, half_size=True)
 
 
-def _clipped(raw: RawPy, half: bool) -> NDArray[np.bool_]:
-    """Return which samples have a saturated photosite of their colour among the neighbours they come from."""
+def _saturated(raw: RawPy, half_size: bool) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.uint8]]:
+    """Return row and column, in the photograph as it is read, and colour of each saturated photosite."""
     mosaic = raw.raw_image_visible
-    saturated = mosaic >= raw.white_level
-    height, width = ((side + 1) // 2 if half else side for side in mosaic.shape)
-    clipped = np.zeros((height, width, 3), bool)
-    if not saturated.any():
-        return clipped
-    colour = np.minimum(raw.raw_colors_visible, 3)
-    for channel in range(3):
-        # The second green counts as green.
-        sites = saturated & ((colour == channel) | ((colour == 3) & (channel == 1)))
-        clipped[..., channel] = _in_cells(sites) if half else _widened(sites)
-    return clipped
+    parts = [
+        np.flatnonzero(mosaic[top : top + _SLAB_ROWS] >= raw.white_level) + top * mosaic.shape[1]
+        for top in range(0, mosaic.shape[0], _SLAB_ROWS)
+    ]
+    row, column = np.divmod(np.concatenate(parts).astype(np.int32), mosaic.shape[1])
+    colour = raw.raw_colors_visible[row, column]
+    side = 2 if half_size else 1
+    return row // side, column // side, np.where(colour == _SECOND_GREEN, 1, colour)
 
 
-def _widened(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return a mask with its eight neighbours."""
-    wide = mask.copy()
-    wide[1:] |= mask[:-1]
-    wide[:-1] |= mask[1:]
-    result = wide.copy()
-    result[:, 1:] |= wide[:, :-1]
-    result[:, :-1] |= wide[:, 1:]
-    return result
+def _mark_clipped(
+    band: NDArray[np.uint16],
+    row0: int,
+    rows: NDArray[np.int32],
+    columns: NDArray[np.int32],
+    colours: NDArray[np.uint8],
+    reach: int,
+) -> None:
+    """Set each sample of a band to white that has a saturated photosite of its colour within reach.
 
-
-def _in_cells(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which cells of 2 x 2 hold any of a mask."""
-    even = np.pad(mask, [(0, side % 2) for side in mask.shape])
-    return np.asarray(even.reshape(even.shape[0] // 2, 2, even.shape[1] // 2, 2).any(axis=(1, 3)))
+    Saturated photosites are few, so that going through them takes less than masks of the whole band.
+    """
+    near = slice(*np.searchsorted(rows, (row0 - reach, row0 + len(band) + reach)))
+    for down, across in product(range(-reach, reach + 1), repeat=2):
+        row, column = rows[near] - row0 + down, columns[near] + across
+        inside = (row >= 0) & (row < band.shape[0]) & (column >= 0) & (column < band.shape[1])
+        band[row[inside], column[inside], colours[near][inside]] = _WHITE
 
 
 def _exif(path: Path) -> dict[str, Any]:
