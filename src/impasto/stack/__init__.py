@@ -96,7 +96,7 @@ def stack(
     colour: str | os.PathLike[str] | None = None,
     half_size: bool = False,
     overwrite: bool = False,
-    memory_bytes: float = 1.2e9,
+    memory_bytes: float = 1.6e9,
     show_progress: bool | None = None,
 ) -> StackSummary:
     """Put the photographs of a folder into a store, as linear radiance.
@@ -377,8 +377,9 @@ class _Job:
         else:
             for row, band in photograph.bands(stores.STACK_CHUNK):
                 self._check_stop()
-                clipped += linearise.clipped_samples(band)
-                self._store(writer, light, row, linearise(band, row))
+                stored, more = linearise.stored(band, row)
+                clipped += more
+                self._store(writer, light, row, stored)
                 advance(len(band))
         writer.finish_light(light, sha256, clipped)
         return False

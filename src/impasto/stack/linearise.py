@@ -76,8 +76,7 @@ class Linearisation:
         self.clip_level = self.clip_level / self.white_level
         self.step /= self.white_level
 
-    def clipped_samples(self, band: NDArray[Any]) -> int:
-        """Return how many samples of a band (rows, W, C), as the photograph holds them, are clipped."""
+    def _clipped_samples(self, band: NDArray[Any]) -> int:
         if not math.isfinite(self._threshold):
             return int(np.count_nonzero(np.isposinf(band))) if self.is_float else 0
         threshold = self._threshold if self.is_float else math.ceil(self._threshold)
@@ -92,23 +91,33 @@ class Linearisation:
         table = self._table
         if table is None and self._codes is not None:
             table = np.broadcast_to(self._codes.T / _WHITE, (band.shape[2], len(self._codes)))
-        return self._correct(band, row0, table, None)
+        return self._correct(band, row0, table, None)[0]
 
-    def __call__(self, band: NDArray[Any], row0: int = 0) -> NDArray[Any]:
-        """Return a band of shape (rows, W, C) as it is stored; samples that are not finite become NaN.
+    def stored(self, band: NDArray[Any], row0: int = 0) -> tuple[NDArray[Any], int]:
+        """Return a band as it is stored, and how many of its samples are clipped.
 
         Parameters
         ----------
-        band : ndarray
+        band : ndarray of shape (rows, W, C)
+            As the photograph holds it.
         row0 : int
             Its first row in the photograph.
+
+        Returns
+        -------
+        values : ndarray of shape (rows, W, C)
+            Samples that are not finite are NaN.
+        clipped : int
         """
+        if self._corrects and not self.is_float:
+            return self._correct(band, row0, self._table, self._per_step)
+        return self._decoded(band, row0), self._clipped_samples(band)
+
+    def _decoded(self, band: NDArray[Any], row0: int) -> NDArray[Any]:
         if self.is_float:
             band = self._corrected_floats(band, row0) if self._corrects else np.asarray(band, np.float32)
             missing = ~np.isfinite(band)
             return np.where(missing, np.float32(np.nan), band) if missing.any() else band
-        if self._corrects:
-            return self._correct(band, row0, self._table, self._per_step)
         codes = self._codes
         if codes is None:
             return band
@@ -124,9 +133,9 @@ class Linearisation:
 
     def _correct(
         self, band: NDArray[Any], row0: int, table: NDArray[np.float64] | None, per_step: float | None
-    ) -> NDArray[Any]:
+    ) -> tuple[NDArray[Any], int]:
         clip = math.ceil(self._threshold) if math.isfinite(self._threshold) else 1 << 16
-        corrected, _ = _core.correct(
+        return _core.correct(
             np.ascontiguousarray(band, np.uint16),
             row0=row0,
             height=self._height,
@@ -136,7 +145,6 @@ class Linearisation:
             gain=self._gain,
             per_step=per_step,
         )
-        return corrected
 
     def _corrected_floats(self, band: NDArray[Any], row0: int) -> NDArray[np.float32]:
         radiance = np.array(band, np.float32)
