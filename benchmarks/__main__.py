@@ -10,7 +10,7 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from benchmarks import accuracy, angles, procedures, speed, viewer, whole
+from benchmarks import accuracy, angles, procedures, raw, speed, viewer, whole
 from benchmarks.photographs import write_capture
 from benchmarks.problem import LIGHTS, light_directions, simulate
 from benchmarks.report import Row, write
@@ -18,6 +18,8 @@ from benchmarks.report import Row, write
 SCIPY_BAR = 800
 WHOLE_BAR = 1.4
 MEMORY_BAR_GB = 1.5
+RAW_BAR = 1.3
+RAW_MEMORY_BAR_GB = 2.0
 ANGLES_BAR_S = 120
 # Of a fit of 4 Mpx; larger ones are sampled, and are to take no longer.
 REPORT_BAR_S = 10.0
@@ -121,6 +123,19 @@ def whole_rows(folder: Path, sizes: list[tuple[int, int]]) -> list[Row]:
     return rows
 
 
+def raw_rows(folder: Path, height: int, width: int) -> list[Row]:
+    """Compare `impasto stack` of raw files, with every correction, with LibRaw's decoding alone."""
+    measured = raw.measure(folder, height, width)
+    title = f"{raw.PHOTOGRAPHS} raw files × {measured['megapixels']:.1f} Mpx"
+    by_cpu = f"{measured['cpu_ratio']:.3g} by processor time"
+    return [
+        Row(f"{title}: stack, s", measured["stack_s"], note="dark frame, flat field and white reference"),
+        Row(f"{title}: LibRaw's decoding alone, s", measured["decode_s"]),
+        Row(f"{title}: stack over decoding", measured["ratio"], RAW_BAR, note=by_cpu),
+        Row(f"{title}: peak memory, GB", measured["peak_gb"], RAW_MEMORY_BAR_GB),
+    ]
+
+
 def viewer_rows(folder: Path, panning_s: float) -> list[Row]:
     """Open the page of a large painting, and pan it."""
     measured = viewer.measure(folder, panning_s)
@@ -141,7 +156,7 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="a tenth of the pixels")
     parser.add_argument(
         "--only",
-        choices=["accuracy", "speed", "procedures", "angles", "whole", "viewer"],
+        choices=["accuracy", "speed", "procedures", "angles", "whole", "raw", "viewer"],
         help="one section; prints, writes nothing",
     )
     parser.add_argument("--folder", type=Path, help="where to put the photographs and stores (about 8 GB)")
@@ -156,6 +171,10 @@ def main() -> int:
             "procedures": ("Procedures", lambda: procedure_rows(folder, 2048 if share == 1 else 320)),
             "angles": ("Which photographs", lambda: angles_rows(folder, 256, 20_000 // share)),
             "whole": ("From photographs to maps", lambda: whole_rows(folder, sizes)),
+            "raw": (
+                "Raw files",
+                lambda: raw_rows(folder / "raw", *((400, 600) if share > 1 else (4000, 6000))),
+            ),
             "viewer": ("The page", lambda: viewer_rows(folder / "page", 120 / share)),
         }
         chosen = [arguments.only] if arguments.only else list(sections)
