@@ -55,6 +55,7 @@ def test_commands_stand_in_the_order_of_the_pipeline():
         "fit",
         "render",
         "maps",
+        "height",
         "evaluate",
         "compare",
         "gonio",

@@ -15,7 +15,7 @@ import impasto
 from impasto.errors import OptionError, OutputError, StoreError
 from impasto.fit.light_process import hull_of
 from impasto.geometry import dome_direction
-from impasto.publish.height import integrate_normals
+from impasto.maps.integration import integrate_normals
 from impasto.publish.residual import PackedResidual
 from impasto.residual import ZERO, ResidualTerm
 from impasto.store import open_fit, open_published

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from impasto.fit.procedure import FitOptions
     from impasto.geometry import Camera, Lights
     from impasto.maps import maps
+    from impasto.maps.height import height
     from impasto.psychophysics import experiment
     from impasto.psychophysics.planning import observers
     from impasto.psychophysics.scaling.scale import scale
@@ -51,6 +52,7 @@ __all__ = [
     "fit",
     "gloss",
     "gonio",
+    "height",
     "maps",
     "models",
     "observers",
@@ -81,6 +83,7 @@ _HOME = {
     "fit": "fit",
     "gloss": "evaluate.gloss",
     "gonio": "evaluate.gonio",
+    "height": "maps.height",
     "maps": "maps",
     "models": "models",
     "observers": "psychophysics.planning",

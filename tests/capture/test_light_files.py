@@ -175,7 +175,9 @@ arm_angle_deg = "left"
     assert any(
         "[photographs.noise]: unknown key reed. Allowed here: read, photon, relative" in p for p in problems
     )
-    assert any("light 1 (a.tif): unknown key angle. Allowed here: direction, arm_angle_deg" in p for p in problems)
+    assert any(
+        "light 1 (a.tif): unknown key angle. Allowed here: direction, arm_angle_deg" in p for p in problems
+    )
     assert any("light 2: key file is missing" in p for p in problems)
     assert any("light 2: arm_angle_deg = 'left'" in p for p in problems)
     assert len(problems) == 8

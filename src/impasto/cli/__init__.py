@@ -16,6 +16,7 @@ COMMANDS = (
     "fit",
     "render",
     "maps",
+    "height",
     "evaluate",
     "compare",
     "gonio",

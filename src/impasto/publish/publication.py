@@ -22,9 +22,9 @@ from impasto.errors import OptionError, Problem
 from impasto.evaluate.gloss import PixelGloss
 from impasto.evaluate.glossmeter import GLOSSMETERS
 from impasto.fit.pyramid import halve
+from impasto.maps.integration import integrate_normals
 from impasto.models import MODELS, parse_model
 from impasto.publish.arrays import Codes, PackedArray, pixels_of
-from impasto.publish.height import integrate_normals
 from impasto.publish.photographs import photograph_arrays, spread
 from impasto.publish.residual import PackedResidual
 from impasto.store import (
