@@ -24,6 +24,10 @@ def evaluate(
         Path | None,
         typer.Option("--held-out-lights", metavar="FILE", help="Names of photographs, or a light file."),
     ] = None,
+    folds: Annotated[
+        int | None,
+        typer.Option("--folds", metavar="K", help="Hold out every photograph once, in K rounds of fits."),
+    ] = None,
     model: Annotated[
         list[str] | None,
         typer.Option("--model", metavar="NAME", help="May be repeated; those in the store by default."),
@@ -42,9 +46,11 @@ def evaluate(
             models=model or (),
             held_out=held_out,
             held_out_lights=held_out_lights,
+            folds=folds,
             baselines=baselines,
         )
-        report.say(f"{len(summary.held_out)} photographs held out, {summary.fitted} fitted")
+        how = "held out" if folds is None else f"held out once each, in {folds} rounds"
+        report.say(f"{len(summary.held_out)} photographs {how}, {summary.fitted} fitted")
         for heading, header, rows in evaluate_tables(summary):
             report.say()
             report.say(heading)

@@ -17,10 +17,11 @@ from impasto.colour import encode_srgb
 from impasto.errors import OptionError, Problem, StoreError
 from impasto.evaluate.baselines import BaselineErrors, baseline_errors
 from impasto.evaluate.errors import ErrorAccumulator, ImageErrors, mean_errors
-from impasto.evaluate.held_out import listed_lights, named_lights, spread_lights
+from impasto.evaluate.held_out import fold_lights, listed_lights, named_lights, spread_lights
+from impasto.evaluate.results import LightErrors, ModelErrors, join_baselines, join_models
 from impasto.fit import FitOptions, fit
 from impasto.geometry import Lights, zenith_azimuth
-from impasto.models import parse_model
+from impasto.models import ModelSpec, parse_model
 from impasto.progress import progress
 from impasto.render import render_bands
 from impasto.store import (
@@ -40,55 +41,6 @@ _DEFAULT_MODELS = ("torrance-sparrow", "phong")
 _DEFAULT_HELD_OUT = 5
 # The renderings that are kept for a report are thinned out to this many pixels along their longer side.
 _KEPT_PX = 640
-
-
-@dataclass(frozen=True)
-class LightErrors:
-    """The errors under one light.
-
-    Parameters
-    ----------
-    name : str
-        The photograph's name.
-    zenith_deg, azimuth_deg : float
-        Where the light stood.
-    errors : ImageErrors
-        How far the rendering is from the photograph.
-    """
-
-    name: str
-    zenith_deg: float
-    azimuth_deg: float
-    errors: ImageErrors
-
-
-@dataclass(frozen=True)
-class ModelErrors:
-    """The errors of one model.
-
-    Parameters
-    ----------
-    model : str
-        The model's name.
-    procedure : str
-        How it was fitted.
-    refitted : bool
-        Whether it was fitted anew without the held-out photographs; false where the fit in the store had not
-        seen them anyway.
-    lights : tuple of LightErrors
-        One entry per held-out photograph.
-    mean : ImageErrors
-        The mean over them.
-    without_residual : ImageErrors or None
-        The mean of the model alone, where the fit describes what it leaves over too.
-    """
-
-    model: str
-    procedure: str
-    refitted: bool
-    lights: tuple[LightErrors, ...]
-    mean: ImageErrors
-    without_residual: ImageErrors | None = None
 
 
 @dataclass(frozen=True)
@@ -127,6 +79,7 @@ def evaluate(
     models: Sequence[str] = (),
     held_out: int | None = None,
     held_out_lights: str | PathLike[str] | Sequence[str] | None = None,
+    folds: int | None = None,
     baselines: bool = True,
     show_progress: bool | None = None,
 ) -> EvaluateSummary:
@@ -147,6 +100,9 @@ def evaluate(
         How many photographs to hold out, spread in elevation; 5 by default, fewer where there are few.
     held_out_lights : path or sequence of str, optional
         Which photographs to hold out instead: a file that names them, or their names.
+    folds : int, optional
+        Hold out every photograph once instead, in so many rounds of fits, each spread in elevation and
+        azimuth. The store keeps nothing of it, because no one fit stands for the result.
     baselines : bool, optional
         Whether to judge the relighting methods in use too, fitted to the same photographs.
     show_progress : bool, optional
@@ -159,7 +115,8 @@ def evaluate(
     Raises
     ------
     OptionError
-        If both ways to choose photographs are used, a name is unknown, or no photographs are left to fit.
+        If more than one way to choose photographs is used, a name is unknown, or no photographs are left to
+        fit.
     StoreError
         If the stack is missing, unfinished or damaged.
     """
@@ -167,7 +124,59 @@ def evaluate(
     path = Path(store)
     specs = [parse_model(name) for name in models or fitted_models(path) or _DEFAULT_MODELS]
     stack = open_stack(path)
-    held = _held_out(stack.lights, held_out, held_out_lights)
+    rounds = _rounds(stack.lights, held_out, held_out_lights, folds)
+    judged = [_judge(stack, specs, held, baselines, folds is None, show_progress) for held in rounds]
+    held = [index for fold in rounds for index in fold]
+    return EvaluateSummary(
+        store=path,
+        held_out=tuple(stack.lights.names[index] for index in held),
+        fitted=len(stack.lights) - max(len(fold) for fold in rounds),
+        models=tuple(join_models([found.models[place] for found in judged]) for place in range(len(specs))),
+        baselines=join_baselines([found.baselines for found in judged]),
+        not_recorded=judged[0].not_recorded,
+        seconds=time.perf_counter() - started,
+    )
+
+
+def _rounds(
+    lights: Lights,
+    count: int | None,
+    chosen: str | PathLike[str] | Sequence[str] | None,
+    folds: int | None,
+) -> list[list[int]]:
+    """Return which photographs are held out in each round of fits."""
+    if folds is None:
+        return [_held_out(lights, count, chosen)]
+    if count is not None or chosen is not None:
+        raise OptionError(
+            Problem(
+                where="--folds",
+                what="holds out every photograph once, and others were chosen too",
+                do="Leave out --held-out and --held-out-lights",
+            )
+        )
+    return fold_lights(lights, folds)
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """What one round found."""
+
+    models: tuple[ModelErrors, ...]
+    baselines: tuple[BaselineErrors, ...]
+    not_recorded: str
+
+
+def _judge(
+    stack: Stack,
+    specs: Sequence[ModelSpec],
+    held: Sequence[int],
+    baselines: bool,
+    record: bool,
+    show_progress: bool | None,
+) -> _Judged:
+    """Fit without photographs where that was not done, and compare renderings with them."""
+    path = stack.store
     names = tuple(stack.lights.names[index] for index in held)
     results = []
     not_recorded = ""
@@ -203,20 +212,15 @@ def evaluate(
                 without_residual=alone,
             )
             results.append(result)
+            if not record:
+                continue
             try:
                 write_evaluation(path, spec.name, _record(result, fitted, stack, kept), kept)
             except StoreError as error:  # a store that may only be read can be judged all the same
                 not_recorded = str(error)
     seen = [number for number in range(len(stack.lights)) if number not in held]
-    return EvaluateSummary(
-        store=path,
-        held_out=names,
-        fitted=len(stack.lights) - len(held),
-        models=tuple(results),
-        baselines=baseline_errors(stack, seen, held, show_progress) if baselines else (),
-        not_recorded=not_recorded,
-        seconds=time.perf_counter() - started,
-    )
+    without_model = baseline_errors(stack, seen, held, show_progress) if baselines else ()
+    return _Judged(tuple(results), without_model, not_recorded)
 
 
 def _held_out(

@@ -50,6 +50,36 @@ def spread_lights(lights: Lights, count: int) -> list[int]:
     return sorted(int(group[len(group) // 2]) for group in np.array_split(order, count))
 
 
+def fold_lights(lights: Lights, folds: int) -> list[list[int]]:
+    """Divide lights into folds, each spread in elevation and azimuth, so that each is held out once.
+
+    The lights are ordered by their zenith angle, within 5° by azimuth, and dealt out in turn.
+
+    Parameters
+    ----------
+    lights : Lights
+        The lights of a stack.
+    folds : int
+        How many, from 2 to as many as there are lights.
+
+    Returns
+    -------
+    list of list of int
+        Indices into `lights`, in rising order.
+
+    Raises
+    ------
+    OptionError
+        If there are fewer lights than folds, or fewer than two folds.
+    """
+    if not 2 <= folds <= len(lights):
+        what = f"is not from 2 to {len(lights)}, the number of photographs"
+        raise OptionError(Problem(f"--folds {folds}", what, "Choose a number in that range, such as 5"))
+    zenith, azimuth = zenith_azimuth(lights.direction)
+    order = np.lexsort((azimuth, np.floor(np.degrees(zenith) / 5.0)))
+    return [sorted(int(index) for index in order[first::folds]) for first in range(folds)]
+
+
 def named_lights(path: str | PathLike[str], names: tuple[str, ...]) -> list[int]:
     """Read from a file which photographs to hold out.
 

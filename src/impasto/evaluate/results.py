@@ -1,0 +1,93 @@
+"""The errors of models by held-out light, and how several rounds of fits are taken together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from impasto.evaluate.baselines import BaselineErrors
+from impasto.evaluate.errors import ImageErrors, mean_errors
+
+
+@dataclass(frozen=True)
+class LightErrors:
+    """The errors under one light.
+
+    Parameters
+    ----------
+    name : str
+        The photograph's name.
+    zenith_deg, azimuth_deg : float
+        Where the light stood.
+    errors : ImageErrors
+        How far the rendering is from the photograph.
+    """
+
+    name: str
+    zenith_deg: float
+    azimuth_deg: float
+    errors: ImageErrors
+
+
+@dataclass(frozen=True)
+class ModelErrors:
+    """The errors of one model.
+
+    Parameters
+    ----------
+    model : str
+        The model's name.
+    procedure : str
+        How it was fitted.
+    refitted : bool
+        Whether it was fitted anew without the held-out photographs; false where the fit in the store had not
+        seen them anyway.
+    lights : tuple of LightErrors
+        One entry per held-out photograph.
+    mean : ImageErrors
+        The mean over them.
+    without_residual : ImageErrors or None
+        The mean of the model alone, where the fit describes what it leaves over too.
+    """
+
+    model: str
+    procedure: str
+    refitted: bool
+    lights: tuple[LightErrors, ...]
+    mean: ImageErrors
+    without_residual: ImageErrors | None = None
+
+
+def join_models(found: Sequence[ModelErrors]) -> ModelErrors:
+    """Return the errors of one model over all rounds, each with other photographs held out."""
+    lights = tuple(entry for part in found for entry in part.lights)
+    alone = [part.without_residual for part in found]
+    weights = [len(part.lights) for part in found]
+    return replace(
+        found[0],
+        refitted=any(part.refitted for part in found),
+        lights=lights,
+        mean=mean_errors([entry.errors for entry in lights]),
+        without_residual=_weighted([entry for entry in alone if entry is not None], weights)
+        if all(entry is not None for entry in alone)
+        else None,
+    )
+
+
+def join_baselines(found: Sequence[Sequence[BaselineErrors]]) -> tuple[BaselineErrors, ...]:
+    """Return the errors of each method over all rounds; methods that some round lacked are left out."""
+    by_name = [{entry.method: entry for entry in part} for part in found]
+    joined = []
+    for first in found[0]:
+        if not all(first.method in part for part in by_name):
+            continue
+        parts = [part[first.method] for part in by_name]
+        lights = tuple(entry for part in parts for entry in part.lights)
+        scale = " or ".join(sorted({part.scale for part in parts}))
+        count = max(part.coefficients for part in parts)
+        joined.append(BaselineErrors(first.method, count, scale, lights, mean_errors(lights)))
+    return tuple(joined)
+
+
+def _weighted(means: Sequence[ImageErrors], weights: Sequence[int]) -> ImageErrors:
+    return mean_errors([mean for mean, weight in zip(means, weights, strict=True) for _ in range(weight)])
