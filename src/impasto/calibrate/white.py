@@ -53,6 +53,7 @@ def white(
     *,
     box: Sequence[int],
     lights: str | PathLike[str],
+    light: str | None = None,
     reflectance: float = 0.99,
     normal: Sequence[float] = (0.0, 0.0, 1.0),
     height_mm: float = 0.0,
@@ -71,6 +72,8 @@ def white(
         First column, first row, end column and end row of the reference in pixels.
     lights : path
         Light file of the photographs.
+    light : str, optional
+        Name of the light of a single photograph that has another name.
     reflectance : float, optional
         Of the reference, which is matte.
     normal : sequence of 3 float, optional
@@ -96,7 +99,7 @@ def white(
     shots = read_shots(photographs_in(Path(photos)))
     file = read_light_file(Path(lights))
     tilt = np.asarray(normal, np.float64)
-    problems = box_problems(box, shots[0].codes.shape, "--box")
+    problems = [*box_problems(box, shots[0].codes.shape, "--box"), *_light_problems(light, shots, file)]
     if not 0 < reflectance <= 1.2:
         problems.append(
             Problem(f"--reflectance {reflectance:g}", "is not from 0 to 1", "Give it as a share of 1")
@@ -110,7 +113,7 @@ def white(
     found = []
     clipped = []
     for shot in shots:
-        row = _row(shot, file)
+        row = _row(light or shot.name, file)
         if row is None:
             continue
         left, top, right, bottom = box
@@ -149,8 +152,21 @@ def white(
     return White(Path(out), radiance, light_rgb, spread, len(samples))
 
 
-def _row(shot: Shot, file: LightFile) -> LightRow | None:
-    return next((row for row in file.rows if Path(row.file or "").stem == shot.name), None)
+def _row(name: str, file: LightFile) -> LightRow | None:
+    return next((row for row in file.rows if Path(row.file or "").stem == name), None)
+
+
+def _light_problems(light: str | None, shots: list[Shot], file: LightFile) -> list[Problem]:
+    """Return what is wrong with the name of a single photograph's light."""
+    if light is None:
+        return []
+    where, problems = f"--light {light}", []
+    if len(shots) > 1:
+        what = f"names one light for {len(shots)} photographs"
+        problems.append(Problem(where, what, "Give one photograph, or name them like their lights"))
+    if not file.problems and _row(light, file) is None:
+        problems.append(Problem(where, f"is no light in {file.path.name}", "Correct the name"))
+    return problems
 
 
 def _irradiance(

@@ -185,6 +185,10 @@ def white(
         str, typer.Option("--box", metavar="C0,R0,C1,R1", help="Corners of the reference in pixels.")
     ],
     lights: Annotated[Path, typer.Option("--lights", metavar="FILE", help="Light file of the photographs.")],
+    light: Annotated[
+        str | None,
+        typer.Option("--light", metavar="NAME", help="Light of a single photograph of another name."),
+    ] = None,
     reflectance: Annotated[
         float, typer.Option("--reflectance", metavar="SHARE", help="Of the reference.")
     ] = 0.99,
@@ -205,6 +209,7 @@ def white(
             out,
             box=corners(box, "--box"),
             lights=lights,
+            light=light,
             reflectance=reflectance,
             normal=numbers(normal, 3, "--normal"),
             height_mm=height_mm,
