@@ -34,6 +34,7 @@ MODELS = ("torrance-sparrow", "phong")
 _SIZE = (480, 360)
 _LIGHTS = 45
 _HELD_OUT = 5
+_VIGNETTING = 0.2
 _SWEEP_DEG = tuple(range(-66, 67, 6))
 # What an earlier demo left, and nothing else, may be replaced.
 _PARTS = (
@@ -76,22 +77,32 @@ def demo(
     folder = _clear(Path(out))
     photos, store = folder / "photos", folder / "painting.zarr"
     clock = _Clock(say)
-    with clock.step("simulate", f"simulate {photos} --dome --lights {_LIGHTS} --size {size[0]},{size[1]}"):
-        simulated = simulate(photos, dome=True, lights=_LIGHTS, size=size, show_progress=show_progress)
+    seen = f"--size {size[0]},{size[1]} --vignetting {_VIGNETTING}"
+    with clock.step("simulate", f"simulate {photos} --dome --lights {_LIGHTS} {seen}"):
+        simulated = simulate(
+            photos,
+            dome=True,
+            lights=_LIGHTS,
+            size=size,
+            vignetting=_VIGNETTING,
+            show_progress=show_progress,
+        )
         say(f"{simulated.photographs} photographs of a still life that does not exist")
-    with clock.step("calibrate", *calibration.commands(photos, folder)):
-        calibrated = calibration.calibrate_studio(photos, folder)
+    with clock.step("calibrate", *calibration.commands(photos, folder, size)):
+        calibrated = calibration.calibrate_studio(photos, folder, size)
         for line in (*lights_lines(calibrated.lights), *oecf_lines(calibrated.response)):
             say(line)
-    dark, colour = calibrated.dark.file, calibrated.colour.file
-    files = f"--lights {calibrated.lights_file} --dark {dark} --colour {colour}"
-    with clock.step("stack", f"stack {photos} {store} {files}"):
+    named = {"lights": calibrated.lights_file, **calibrated.files}
+    options = " ".join(f"--{name} {file}" for name, file in named.items())
+    with clock.step("stack", f"stack {photos} {store} {options}"):
         stacked = stack(
             photos,
             store,
             lights=calibrated.lights_file,
-            dark=dark,
-            colour=colour,
+            dark=calibrated.dark.file,
+            flat=calibrated.flat.file,
+            white=calibrated.white.file,
+            colour=calibrated.colour.file,
             show_progress=show_progress,
         )
         for line in stack_lines(stacked):
@@ -101,8 +112,9 @@ def demo(
     listed = folder / "held-out.txt"
     listed.write_text("\n".join(held.names) + "\n", encoding="utf-8")
     with clock.step("fit", f"fit {store} " + " ".join(f"--exclude {name}" for name in held.names)):
-        options = FitOptions(exclude=held.names)
-        fitted = fit(store, models=MODELS, options=options, show_progress=show_progress)
+        fitted = fit(
+            store, models=MODELS, options=FitOptions(exclude=held.names), show_progress=show_progress
+        )
         for line in fit_lines(fitted):
             say(line)
     with clock.step("evaluate", f"evaluate {store} --held-out-lights {listed}"):
@@ -111,7 +123,6 @@ def demo(
         )
         for heading, header, rows in evaluate_tables(evaluated):
             say(f"{heading}: " + ", ".join(f"{header[k]} {rows[-1][k]}" for k in (2, 3, 4)))
-    exposure = 1 / calibrated.white
     sweep = f"{_SWEEP_DEG[0]}:{_SWEEP_DEG[-1]}:{_SWEEP_DEG[1] - _SWEEP_DEG[0]}"
     renderings = folder / "renderings"
     with clock.step("render", f"render {store} --model {MODELS[0]} --arm {sweep} --out {renderings}/sweep"):
@@ -121,7 +132,6 @@ def demo(
                 model=model,
                 lights=held,
                 out=renderings / model,
-                exposure=exposure,
                 show_progress=show_progress,
             )
             for model in MODELS
@@ -149,7 +159,6 @@ def demo(
         evaluated=evaluated,
         rendered=tuple(rendered),
         mapped=tuple(mapped),
-        exposure=exposure,
         compared=compared,
         steps=clock.seconds,
         seconds=time.perf_counter() - started,

@@ -1,4 +1,4 @@
-"""The demo's calibration from the shots that the simulator makes: spheres, grey scale, cap on, colours."""
+"""The demo's calibration from shots that the simulator makes: spheres, grey scale, cap on, card, colours."""
 
 from __future__ import annotations
 
@@ -10,9 +10,12 @@ import numpy as np
 from impasto import calibrate
 from impasto.calibrate.colour import Colour
 from impasto.calibrate.dark import Dark
+from impasto.calibrate.flat import Flat
 from impasto.calibrate.lights import LightsCalibration
 from impasto.calibrate.oecf import Oecf
+from impasto.calibrate.white import White
 from impasto.capture import read_capture
+from impasto.geometry import Lights
 
 PART = "calibration"
 """What it makes in the demo's folder."""
@@ -27,19 +30,19 @@ class CalibrationSummary:
     lights : LightsCalibration
     off_deg : float
         Median angle between the directions found and those of the simulated lamps.
-    white : float
-        What a white surface that faces the brightest lamp reads, as the simulation has it: pictures are
-        brightened by as much.
     response : Oecf
     dark : Dark
+    flat : Flat
+    white : White
     colour : Colour
     """
 
     lights: LightsCalibration
     off_deg: float
-    white: float
     response: Oecf
     dark: Dark
+    flat: Flat
+    white: White
     colour: Colour
 
     @property
@@ -47,22 +50,32 @@ class CalibrationSummary:
         """What `stack` reads of the lights."""
         return self.lights.folder / "lights.toml"
 
+    @property
+    def files(self) -> dict[str, Path]:
+        """The calibration files that `stack` applies, by kind."""
+        return {name: getattr(self, name).file for name in ("dark", "flat", "white", "colour")}
 
-def commands(photos: Path, folder: Path) -> tuple[str, ...]:
+
+def commands(photos: Path, folder: Path, size: tuple[int, int]) -> tuple[str, ...]:
     """Return the commands that do what `calibrate_studio` does, without the program's name."""
     shots, made = photos / "calibration", folder / PART
+    box = ",".join(str(edge) for edge in _middle(size))
+    frontal = _frontal(read_capture(photos).lights)
     return (
         f"calibrate lights {shots}/spheres --camera {photos}/capture.toml --out {made}/lights",
         f"calibrate oecf {shots}/grey_scale.tif {shots}/grey_scale.csv {made}/oecf.json "
         f"--card {shots}/grey_scale_card.tif --dark {shots}/dark.tif",
         f"calibrate dark {shots}/dark.tif {made}/dark.json",
+        f"calibrate flat {shots}/white_card.tif {made}/flat.json --dark {made}/dark.json",
+        f"calibrate white {shots}/white_card.tif {made}/white.json --box {box} --reflectance 1 "
+        f"--lights {made}/lights/lights.toml --light {frontal}",
         f"calibrate colour {shots}/colour_chart.tif {shots}/colour_chart.csv {made}/colour.json "
         f"--card {shots}/white_card.tif --dark {made}/dark.json",
     )
 
 
-def calibrate_studio(photos: Path, folder: Path) -> CalibrationSummary:
-    """Find lights, response, dark level and colours of the simulated studio from its calibration shots.
+def calibrate_studio(photos: Path, folder: Path, size: tuple[int, int]) -> CalibrationSummary:
+    """Find lights, response, dark level, evenness, white and colours of the simulated studio from its shots.
 
     Parameters
     ----------
@@ -70,6 +83,8 @@ def calibrate_studio(photos: Path, folder: Path) -> CalibrationSummary:
         Folder that `simulate` made.
     folder : Path
         The demo's; the calibration files become a folder in it.
+    size : (int, int)
+        Width and height of the photographs.
 
     Returns
     -------
@@ -85,6 +100,16 @@ def calibrate_studio(photos: Path, folder: Path) -> CalibrationSummary:
         dark=shots / "dark.tif",
     )
     dark = calibrate.dark(shots / "dark.tif", made / "dark.json")
+    flat = calibrate.flat(shots / "white_card.tif", made / "flat.json", dark=dark.file)
+    true = read_capture(photos).lights
+    white = calibrate.white(
+        shots / "white_card.tif",
+        made / "white.json",
+        box=_middle(size),
+        reflectance=1,
+        lights=made / "lights" / "lights.toml",
+        light=_frontal(true),
+    )
     colour = calibrate.colour(
         shots / "colour_chart.tif",
         shots / "colour_chart.csv",
@@ -92,8 +117,18 @@ def calibrate_studio(photos: Path, folder: Path) -> CalibrationSummary:
         card=shots / "white_card.tif",
         dark=dark.file,
     )
-    true = read_capture(photos).lights
     order = [true.names.index(name) for name in lights.names]
     cosine = np.sum(true.direction[order] * lights.lights.direction, axis=1)
     off_deg = float(np.median(np.degrees(np.arccos(np.clip(cosine, -1, 1)))))
-    return CalibrationSummary(lights, off_deg, float(true.intensity.max()), response, dark, colour)
+    return CalibrationSummary(lights, off_deg, response, dark, flat, white, colour)
+
+
+def _middle(size: tuple[int, int]) -> tuple[int, int, int, int]:
+    """Return the box in the middle of the frame, where a flat field is 1."""
+    width, height = size
+    return width * 4 // 9, height * 4 // 9, width * 5 // 9, height * 5 // 9
+
+
+def _frontal(lights: Lights) -> str:
+    """Return the name of the light under which the simulator photographs cards and charts."""
+    return lights.names[int(np.argmax(lights.direction[:, 2]))]

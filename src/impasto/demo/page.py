@@ -50,8 +50,6 @@ class DemoSummary:
         The held-out lights under each model, and the sweep.
     mapped : tuple of MapsSummary
         One entry per model.
-    exposure : float
-        Factor on the radiance in the pictures of the held-out lights.
     compared : ObserversSummary
         What simulated observers chose.
     steps : dict of str to float
@@ -67,7 +65,6 @@ class DemoSummary:
     evaluated: EvaluateSummary
     rendered: tuple[RenderSummary, ...]
     mapped: tuple[MapsSummary, ...]
-    exposure: float
     compared: ObserversSummary
     steps: dict[str, float]
     seconds: float
@@ -106,14 +103,14 @@ def write_page(summary: DemoSummary, truth: Path) -> None:
     _write_calibration(page.section("How camera and lights were calibrated"), summary.calibrated)
     part = page.section("Lights that the fit has not seen")
     part.text(
-        "These photographs were kept out of the fit, and rendered from it. All pictures are brightened "
-        f"{summary.exposure:g} times, so that a white surface facing the light is white."
+        "These photographs were kept out of the fit, and rendered from it. Relative radiance 1, which a "
+        "white surface facing the light has by the white reference, is shown as white."
     )
     for pictures in _held_out_pictures(summary):
         part.pictures(pictures)
     part.table(*_errors(evaluated), caption="Photographs kept out of the fit", total=True)
     part.text(
-        "PSNR and SSIM compare the pictures in sRGB, as photographed and not brightened. RMS / mean compares "
+        "PSNR and SSIM compare the pictures in sRGB, as shown here. RMS / mean compares "
         "relative radiance over all samples that are not clipped."
     )
 
@@ -194,6 +191,12 @@ def _write_calibration(part: Section, calibrated: CalibrationSummary) -> None:
             ),
             ("grey scale", f"the camera is linear within {percent(response.nonlinearity)} and {use}"),
             ("cap on", f"{count(calibrated.dark.hot, 'hot pixel')}; the level is taken off each photograph"),
+            (
+                "white card",
+                f"lens and light depart by up to {percent(calibrated.flat.before)} from the middle of the "
+                f"frame, {percent(calibrated.flat.after)} after correction; a perfect white diffuser reads "
+                f"{calibrated.white.radiance.mean():.4f} of full scale",
+            ),
             ("colour chart", f"CIEDE2000 {left_out:.2f} for patches left out of the fit"),
         ],
         caption="Simulated shots for calibration, with which the photographs were read",
@@ -236,7 +239,7 @@ def _held_out_pictures(summary: DemoSummary) -> Iterator[list[Picture]]:
         light = stack.lights.names.index(entry.name)
         photograph = stack.radiance(slice(0, stack.shape[1]), slice(0, stack.shape[2]), [light])[0]
         where = f"light {entry.zenith_deg:.0f}° from the normal"
-        pictures = [Picture(_png(photograph, summary.exposure), f"Photograph, {where}")]
+        pictures = [Picture(_png(photograph), f"Photograph, {where}")]
         for rendered in summary.rendered[:-1]:
             data = (rendered.out / f"{entry.name}.png").read_bytes()
             pictures.append(Picture(data, f"{_title(rendered.model)}, {where}"))
@@ -286,10 +289,10 @@ def _read(path: Path) -> NDArray[np.float32]:
     return pixels
 
 
-def _png(image_linear: NDArray[np.float32], exposure: float) -> bytes:
+def _png(image_linear: NDArray[np.float32]) -> bytes:
     import imagecodecs
 
-    return bytes(imagecodecs.png_encode(quantise(encode_srgb(image_linear, exposure))))
+    return bytes(imagecodecs.png_encode(quantise(encode_srgb(image_linear))))
 
 
 def _title(model: str) -> str:
