@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from impasto.capture.simulate.charts import colour_chart, grey_scale
 from impasto.capture.simulate.dng import write_dng
 from impasto.cli.commands import app
 
@@ -51,3 +52,54 @@ def test_a_dark_frame_serves_its_own_photographs_only(photos, tmp_path, side, no
     if expected is not None:
         assert expected in " ".join(result.output.split())
         assert not store.exists()
+
+
+def calibrated(kind, folder, side=SIDE, **noted):
+    """Calibrate by raw files of a camera; return the calibration file."""
+
+    def take(name, image):
+        write_dng(folder / name, np.clip(image, 0, 65535).astype(np.uint16), exposure_s=0.02, **noted)
+        return folder / name
+
+    out = folder / f"{kind}.json"
+    if kind == "flat":
+        words = [take("card.dng", grey(side, 30000, 8)), out]
+    elif kind == "white":
+        lights = folder / "lights.lp"
+        lights.write_text("1\nwhite.dng 0 0 1\n")
+        words = [take("white.dng", grey(side, 30000, 8)), out, "--box", "4,4,36,36", "--lights", lights]
+    else:
+        chart, size = {"oecf": grey_scale, "colour": colour_chart}[kind](), (4 * side, 6 * side)
+        table = folder / "chart.csv"
+        table.write_text(chart.table(size))
+        words = [take("chart.dng", 60000 * chart.image(size)), table, out]
+        words += ["--card", take("even.dng", np.full((*size, 3), 30000))]
+    made = run("calibrate", kind, *words)
+    assert made.exit_code == 0, made.output
+    return out
+
+
+@pytest.mark.parametrize(
+    ("kind", "noted", "expected"),
+    [
+        ("flat", {"camera": "other camera"}, "camera impasto other camera, and"),
+        ("flat", {"side": SIDE + 8}, "48 x 48 pixels, and these photographs have 40 x 40 pixels"),
+        ("white", {"camera": "other camera"}, "camera impasto other camera, and"),
+        ("white", {"iso": 400}, "ISO 400, and these photographs have ISO 100"),
+        ("oecf", {"camera": "other camera"}, "camera impasto other camera, and"),
+        ("oecf", {"iso": 400}, "ISO 400, and these photographs have ISO 100"),
+        ("colour", {"camera": "other camera"}, "camera impasto other camera, and"),
+    ],
+)
+def test_every_other_calibration_is_refused_where_it_does_not_fit(photos, tmp_path, kind, noted, expected):
+    store = tmp_path / "s.zarr"
+    result = run("stack", photos, store, f"--{kind}", calibrated(kind, tmp_path, **noted))
+    assert result.exit_code == 1, result.output
+    assert expected in " ".join(result.output.split())
+    assert not store.exists()
+
+
+@pytest.mark.parametrize("kind", ["flat", "white", "oecf", "colour"])
+def test_calibrations_by_the_same_camera_are_taken(photos, tmp_path, kind):
+    result = run("stack", photos, tmp_path / "s.zarr", f"--{kind}", calibrated(kind, tmp_path))
+    assert result.exit_code == 0, result.output
