@@ -11,7 +11,7 @@ import numpy as np
 from impasto.calibrate.dark import dark_image
 from impasto.calibrate.files import subject_of, write_calibration
 from impasto.calibrate.response_file import response_table
-from impasto.calibrate.shots import Shot, photographs_in, read_shots
+from impasto.calibrate.shots import Shot, one_by_one, photographs_in
 from impasto.calibrate.surface import Array, nodes, smooth_surface
 from impasto.capture.light_files import read_light_file
 from impasto.capture.lights import LightFile
@@ -86,22 +86,26 @@ def flat(
     OutputError
         If the file cannot be written.
     """
-    shots = read_shots(photographs_in(Path(photos)))
-    table = response_table(oecf, shots)
-    black = dark_image(dark, shots, table)
+    paths = photographs_in(Path(photos))
     file = None if lights is None else read_light_file(Path(lights))
     problems = [] if file is None else list(file.problems)
     if file is not None and not problems:
-        problems += _light_problems(shots, file)
+        problems += _light_problems(paths, file)
     raise_problems(CaptureError, problems)
+    one = len(paths) == 1
     grids, notes = {}, []
+    seen: list[Shot] = []
     before = after = 0.0
-    for shot in shots:
+    for shot in one_by_one(paths):
+        if not seen:
+            table = response_table(oecf, [shot])
+            black = dark_image(dark, [shot], table)
+        seen.append(shot.without_pixels if seen else shot)
         image = shot.linear(table) - black
         problems += _card_problems(shot, image)
         surface, residual = smooth_surface(image)
         if file is not None:
-            surface = surface / _fall_off(shot, file, len(shots) == 1)[..., None]
+            surface = surface / _fall_off(shot, file, one)[..., None]
         middle = surface[surface.shape[0] // 2, surface.shape[1] // 2]
         grids[shot.name] = surface / middle
         before = max(before, float(np.abs(surface / middle - 1).max()))
@@ -109,7 +113,6 @@ def flat(
     raise_problems(CaptureError, problems)
     if min(float(grid.min()) for grid in grids.values()) <= 0.05:
         notes.append("the card is nearly dark at its edges: it must fill the frame")
-    one = len(shots) == 1
     content = {
         "fall_off_taken_out": file is not None,
         "grids": {"*" if one else name: np.round(grid, 6).tolist() for name, grid in grids.items()},
@@ -120,8 +123,8 @@ def flat(
         Path(out),
         "flat",
         content,
-        subject=subject_of(shots, f_number=True, size=True),
-        made_from=[shot.provenance for shot in shots],
+        subject=subject_of(seen, f_number=True, size=True),
+        made_from=[shot.provenance for shot in seen],
     )
     return Flat(Path(out), () if one else tuple(grids), before, after, file is not None, tuple(notes))
 
@@ -139,17 +142,17 @@ def _card_problems(shot: Shot, image: Array) -> list[Problem]:
     return []
 
 
-def _light_problems(shots: list[Shot], file: LightFile) -> list[Problem]:
+def _light_problems(paths: list[Path], file: LightFile) -> list[Problem]:
     if file.camera.mm_per_px is None:
         do = "Add mm_per_px under [camera]"
         return [Problem(file.path.name, "gives no size of a pixel, which fall-off needs", do)]
-    if len(shots) == 1 and len(file.rows) == 1:
+    if len(paths) == 1 and len(file.rows) == 1:
         return []
     known = {Path(row.file or "").stem for row in file.rows}
     return [
-        Problem(file.path.name, f"has no light {shot.name}", "Name the cards like the painting's photographs")
-        for shot in shots
-        if shot.name not in known
+        Problem(file.path.name, f"has no light {path.stem}", "Name the cards like the painting's photographs")
+        for path in paths
+        if path.stem not in known
     ]
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +73,11 @@ class Shot:
         return np.stack(channels, axis=-1)
 
     @property
+    def without_pixels(self) -> Shot:
+        """The same without what takes memory."""
+        return replace(self, codes=self.codes[:0].copy())
+
+    @property
     def provenance(self) -> dict[str, Any]:
         """What a calibration file says about it."""
         photograph = self.photograph
@@ -106,24 +111,32 @@ def read_shots(paths: Iterable[Path]) -> list[Shot]:
     CaptureError
         Listing all that cannot be read, or that differ in size from the first.
     """
-    shots: list[Shot] = []
+    return list(one_by_one(paths))
+
+
+def one_by_one(paths: Iterable[Path]) -> Iterator[Shot]:
+    """Read photographs that belong together, so that one at a time need be in memory.
+
+    Raises
+    ------
+    CaptureError
+        After the last, listing all that cannot be read, or that differ in size from the first.
+    """
     problems: list[Problem] = []
+    first: Photograph | None = None
     for path in paths:
         try:
-            shots.append(read_shot(path))
+            shot = read_shot(path)
         except CaptureError as error:
             problems += error.problems
-    problems += [
-        Problem(
-            shot.path.name,
-            f"has {_layout(shot)}, expected {_layout(shots[0])} as {shots[0].path.name}",
-            "Export all of them alike, or leave it out",
-        )
-        for shot in shots[1:]
-        if shot.codes.shape != shots[0].codes.shape or shot.codes.dtype != shots[0].codes.dtype
-    ]
+            continue
+        first = first or shot.photograph
+        if _layout(shot.photograph) == _layout(first):
+            yield shot
+            continue
+        what = f"has {_layout(shot.photograph)}, expected {_layout(first)} as {first.path.name}"
+        problems.append(Problem(path.name, what, "Export all of them alike, or leave it out"))
     raise_problems(CaptureError, problems)
-    return shots
 
 
 def photographs_in(folder: Path, exclude: Iterable[str] = ()) -> list[Path]:
@@ -179,6 +192,6 @@ def common(shots: Sequence[Shot], what: Callable[[Photograph], Any]) -> Any:
     return said.pop() if len(said) == 1 else None
 
 
-def _layout(shot: Shot) -> str:
-    height, width, channels = shot.codes.shape
-    return f"{width} x {height} pixels, {channels} channels of {shot.codes.dtype}"
+def _layout(photograph: Photograph) -> str:
+    channels = f"{photograph.channels} channels of {photograph.dtype}"
+    return f"{photograph.width} x {photograph.height} pixels, {channels}"
