@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -74,6 +75,7 @@ def measure(folder: Path, height: int, width: int, photographs: int = PHOTOGRAPH
     corrections = [f"--{kind}={folder / kind}.json" for kind in ("dark", "flat", "white")]
     stack = impasto("stack", str(photos), str(store), *corrections)
     after = _decoding(photos)
+    shutil.rmtree(folder)
     decoding = {name: (before[name] + after[name]) / 2 for name in before}
     return {
         "megapixels": height * width / 1e6,
