@@ -19,7 +19,7 @@ from impasto.residual import kernel
 if TYPE_CHECKING:
     from impasto.fit.self_calibration import PixelFit
 
-# The directions change by less than 0.05 degrees after the third.
+# Five left the directions' errors on a simulated painting as three did.
 _ROUNDS = 3
 _REWEIGHTINGS = 3
 _BLOCK = 256
