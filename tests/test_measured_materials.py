@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks import convergence
 from benchmarks.measured_materials import BASE, MODELS, TOLERANCE, geometric_mean, study
 
 FOLDER = Path(__file__).resolve().parents[2] / "shared" / "reference"
@@ -52,3 +53,13 @@ def test_more_parameters_never_cost(found):
             assert (rms[richer] < rms[model] * (1 + TOLERANCE)).all(), richer
         for richer in ("torrance-sparrow-2", "gtr"):
             assert (rms[richer] < rms[BASE] * (1 + TOLERANCE)).all(), richer
+
+
+@pytest.mark.parametrize("setting", convergence.SETTINGS)
+def test_fits_in_rgb_find_the_least_cost_whatever_the_tilt_and_the_view(setting):
+    """A sample of the ten thousand of docs/measured-materials.md."""
+    if not (FOLDER / "measured_brdf.npz").is_file():
+        pytest.skip("the measured materials are not beside the repository")
+    ended, least = convergence.measure(FOLDER, setting, 200)
+    assert ended >= convergence.SHARE
+    assert least >= convergence.SHARE

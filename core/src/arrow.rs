@@ -54,7 +54,39 @@ impl<const C: usize, const L: usize> Free<C, L> {
             specular: array!(|j| if j < lobes { LaneMask::ALL } else { LaneMask::NONE }),
         }
     }
+
+    /// Holds the free magnitudes that are negative; returns the lanes that have one.
+    #[inline(always)]
+    fn hold_negative<const ISA: Isa>(
+        &mut self,
+        magnitudes: &Magnitudes<ISA, C, L>,
+        lobes: usize,
+        ambient: bool,
+    ) -> LaneMask {
+        let zero = Lane::splat(0.0);
+        let mut violated = LaneMask::NONE;
+        let mut hold = |free: &mut LaneMask, value: Lane<ISA>| {
+            let negative = value.lt(zero) & *free;
+            *free = *free & !negative;
+            violated = violated | negative;
+        };
+        for j in 0..lobes {
+            hold(&mut self.specular[j], magnitudes.specular[j]);
+        }
+        for k in 0..C {
+            hold(&mut self.diffuse[k], magnitudes.diffuse[k]);
+            if ambient {
+                hold(&mut self.ambient[k], magnitudes.ambient[k]);
+            }
+        }
+        violated
+    }
 }
+
+/// How often magnitudes that were held at 0 may be released.
+const RELEASES: usize = 3;
+/// Share of a magnitude's right-hand side that its gradient must exceed to be more than rounding.
+const LEAST_GRADIENT: f64 = 1e-4;
 
 /// Weighted sums of products of the basis functions over the lights, for one channel.
 #[derive(Clone, Copy)]
@@ -205,35 +237,64 @@ impl<const ISA: Isa, const C: usize, const L: usize> Arrow<ISA, C, L> {
         )
     }
 
+    /// Releases the magnitudes held at 0 that the data would raise; returns the lanes that have one.
+    #[inline(always)]
+    fn release(&self, at: &Magnitudes<ISA, C, L>, lobes: usize, free: &mut Free<C, L>) -> LaneMask {
+        let mut released = LaneMask::NONE;
+        let mut release = |free: &mut LaneMask, right: Lane<ISA>, explained: Lane<ISA>| {
+            let raised = (right - explained).gt(right.abs() * Lane::splat(LEAST_GRADIENT)) & !*free;
+            *free = *free | raised;
+            released = released | raised;
+        };
+        for k in 0..C {
+            let sums = &self.channel[k];
+            let mut diffuse = sums.diffuse_one * at.ambient[k];
+            let mut ambient = sums.diffuse_one * at.diffuse[k];
+            for j in 0..lobes {
+                diffuse = sums.diffuse_specular[j].mul_add(at.specular[j], diffuse);
+                ambient = sums.one_specular[j].mul_add(at.specular[j], ambient);
+            }
+            release(&mut free.diffuse[k], self.right.diffuse[k], diffuse);
+            if self.ambient {
+                release(&mut free.ambient[k], self.right.ambient[k], ambient);
+            }
+        }
+        for i in 0..lobes {
+            let mut explained = Lane::splat(0.0);
+            for j in 0..lobes {
+                explained = self.specular_specular[i.min(j)][i.max(j)].mul_add(at.specular[j], explained);
+            }
+            for k in 0..C {
+                let sums = &self.channel[k];
+                explained = sums.diffuse_specular[i].mul_add(at.diffuse[k], explained);
+                explained = sums.one_specular[i].mul_add(at.ambient[k], explained);
+            }
+            release(&mut free.specular[i], self.right.specular[i], explained);
+        }
+        released
+    }
+
     #[inline(always)]
     fn nonnegative(&self, lobes: usize) -> (Magnitudes<ISA, C, L>, Factored<ISA, C, L>) {
         let zero = Lane::splat(0.0);
         let mut free = Free::new(lobes, self.ambient);
-        // Holding every negative magnitude at 0 at once is not quite the constrained optimum where two of them are negative
-        // only together; the next step of the fit begins from here again and mends it.
+        let (mut releases, mut held) = (0, LaneMask::NONE);
         let (mut best, factored) = loop {
             let factored = self.factor(lobes, &free);
             let best = factored.solve_inline(&self.right);
-            let mut violated = LaneMask::NONE;
-            for j in 0..lobes {
-                let negative = best.specular[j].lt(zero) & free.specular[j];
-                free.specular[j] = free.specular[j] & !negative;
-                violated = violated | negative;
-            }
-            for k in 0..C {
-                let negative = best.diffuse[k].lt(zero) & free.diffuse[k];
-                free.diffuse[k] = free.diffuse[k] & !negative;
-                violated = violated | negative;
-                if self.ambient {
-                    let negative = best.ambient[k].lt(zero) & free.ambient[k];
-                    free.ambient[k] = free.ambient[k] & !negative;
-                    violated = violated | negative;
-                }
-            }
+            let violated = free.hold_negative(&best, lobes, self.ambient);
+            held = held | violated;
             // Each round holds one more magnitude at least, so this ends.
-            if !violated.any() {
+            if violated.any() {
+                continue;
+            }
+            // Of those held at once some would be positive beside the others at 0. With one lobe and no ambient term to hold
+            // and to release is Newton's method on a concave function of As; with one, a bound on the rounds serves. Two lobes
+            // that take turns at 0 mislead the fit more than either held.
+            if L > 1 || releases == RELEASES || !held.any() || !self.release(&best, lobes, &mut free).any() {
                 break (best, factored);
             }
+            releases += 1;
         };
         for k in 0..C {
             best.diffuse[k] = best.diffuse[k].max(zero);
@@ -317,5 +378,41 @@ impl<const ISA: Isa, const C: usize, const L: usize> Factored<ISA, C, L> {
             (result.diffuse[k], result.ambient[k]) = self.inverse[k].apply(self.ambient, diffuse, ambient);
         }
         result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::{LANES, PLAIN};
+
+    /// Two lights, two channels: the lobe explains more of the dark channel than there is. At the unconstrained optimum both
+    /// diffuse magnitudes are negative, at the constrained one the first is not.
+    #[test]
+    fn releases_what_was_held_only_together_with_others() {
+        let lights = [(1.0, 1.0, [1.0, 0.05]), (0.2, 0.5, [0.9, 0.5])];
+        let mut arrow = Arrow::<PLAIN, 2>::new(false);
+        let (one, number) = ([Lane::splat(1.0); 2], |value: f64| Lane::<PLAIN>::splat(value));
+        for (diffuse, lobe, radiance) in lights {
+            arrow.add(1, number(diffuse), &[number(lobe)], &radiance.map(number), &one, &one);
+        }
+        let found = arrow.magnitudes(1).0;
+        let cost = |diffuse: [f64; 2], specular: f64| -> f64 {
+            let residual = |k: usize, (d, s, y): (f64, f64, [f64; 2])| (y[k] - diffuse[k] * d - specular * s).powi(2);
+            lights.iter().map(|&light| residual(0, light) + residual(1, light)).sum()
+        };
+        let steps = || (0..=400).map(|step| f64::from(step) / 200.0);
+        let mut least = f64::MAX;
+        for specular in steps() {
+            for first in steps() {
+                for second in [0.0, 0.005, 0.05, 0.5] {
+                    least = least.min(cost([first, second], specular));
+                }
+            }
+        }
+        for lane in 0..LANES {
+            let diffuse = [0, 1].map(|k| f64::from(found.diffuse[k].0[lane]));
+            assert!(cost(diffuse, f64::from(found.specular[0].0[lane])) < least + 1e-5);
+        }
     }
 }

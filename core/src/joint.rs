@@ -16,8 +16,16 @@ use std::marker::PhantomData;
 
 /// Rounds of a robust fit with a wider loss before the one with the loss asked for.
 const ROBUST_STAGES: usize = 2;
+/// Reduced χ² above which a fit may have ended at a lobe of the wrong width.
+const MISFIT: f64 = 2.0;
+/// A coordinate that is far from all.
+const ANY_WIDTH: f64 = 1e9;
 /// Steps from each start, where there are several.
 const EXPLORING_STEPS: usize = 12;
+/// How much greater the cost of a second start may be than that of the first one's end.
+const PROMISING: f64 = 4.0;
+/// Steps from a second start, after which the better lobe is told from the other.
+const RETRYING_STEPS: usize = 8;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
@@ -97,8 +105,9 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
             doubt_shadows(&mut self.grey, illuminations, &mut self.kept);
         }
         let known = self.stack.known_normal::<ISA>(first);
-        let find =
-            |normals: &[[Lane<ISA>; 3]]| start_of::<M, ISA, L>(normals, &self.grey, illuminations, &optics, ambient);
+        let find = |normals: &[[Lane<ISA>; 3]], avoided: Option<Lane<ISA>>| {
+            start_of::<M, ISA, L>(normals, &self.grey, illuminations, &optics, ambient, avoided)
+        };
         let mut problem = Separable::<M, ISA, C, P, L>::new(
             &self.group,
             self.colour,
@@ -113,13 +122,18 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
             (Some(normal), _) => {
                 let shapes = starts::<M, ISA, L>().chain(wider_start::<M, ISA, L>());
                 let points = shapes.map(|coordinates| Point { normal, coordinates });
-                explore(&mut problem, points, wanted)
+                explore(&mut problem, points, wanted, EXPLORING_STEPS).point
             }
             (None, Some(across)) => {
                 let normals = candidates(&self.grey, illuminations);
-                explore(&mut problem, ASIDE.iter().map(|&angle| find(&aside(&normals, across, angle))), wanted)
+                let points = ASIDE.iter().flat_map(|&angle| {
+                    let normals = aside(&normals, across, angle);
+                    let first = find(&normals, None);
+                    [first, find(&normals, Some(first.coordinates[0]))]
+                });
+                explore(&mut problem, points, wanted, EXPLORING_STEPS).point
             }
-            (None, None) => find(&candidates(&self.grey, illuminations)),
+            (None, None) => find(&candidates(&self.grey, illuminations), None),
         };
         if robust {
             problem.robust.trust(&self.kept);
@@ -132,18 +146,44 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
         }
         let mut outcome = minimise(&mut problem, &begin, wanted, self.options.max_steps);
         let mut solution = problem.solve(&outcome.point);
-        // A lobe of magnitude 0 gives its shape no gradient, so a fit that comes there cannot leave. From the normal that it
-        // found the grid of shapes may show a better lobe.
+        // A lobe of magnitude 0 gives its shape no gradient, so a fit that comes there cannot leave; and a weak lobe of a
+        // material that the model does not describe has a narrow and a broad minimum. From the normal that was found the grid
+        // of shapes may show a better lobe.
         let mut trapped = LaneMask::NONE;
         for j in 0..M::LOBES {
             trapped = trapped | !solution.magnitudes.specular[j].positive();
         }
-        trapped = trapped & wanted;
-        if known.is_none() && trapped.any() {
-            let retried = minimise(&mut problem, &find(&[outcome.point.normal]), trapped, self.options.max_steps);
-            let better = retried.cost.lt(solution.quadratic.cost) & trapped;
-            outcome.point = Separable::<M, ISA, C, P, L>::select(better, &retried.point, &outcome.point);
-            outcome.converged = (outcome.converged & !better) | (retried.converged & better);
+        let mut doubtful = trapped;
+        if M::LOBES == 1 && !robust {
+            doubtful = doubtful | (solution.quadratic.cost * problem.per_freedom).gt(Lane::splat(MISFIT));
+        }
+        doubtful = doubtful & wanted;
+        if known.is_none() && doubtful.any() {
+            let avoided = Some(Lane::select(trapped, Lane::splat(ANY_WIDTH), outcome.point.coordinates[0]));
+            let normal = [outcome.point.normal];
+            // A lobe that is not the better one after a few steps will not become it.
+            let tried = match self.across {
+                Some(across) => {
+                    let points = ASIDE.iter().map(|&angle| find(&aside(&normal, across, angle), avoided));
+                    explore(&mut problem, points, doubtful, RETRYING_STEPS)
+                }
+                None => {
+                    let begin = find(&normal, avoided);
+                    let highest = solution.quadratic.cost * Lane::splat(PROMISING);
+                    doubtful = doubtful & (trapped | problem.solve(&begin).quadratic.cost.lt(highest));
+                    let steps = if L == 1 { RETRYING_STEPS } else { self.options.max_steps };
+                    minimise(&mut problem, &begin, doubtful, steps)
+                }
+            };
+            let better = tried.cost.lt(solution.quadratic.cost) & doubtful;
+            if better.any() {
+                let retried = minimise(&mut problem, &tried.point, better, self.options.max_steps);
+                outcome.point = Separable::<M, ISA, C, P, L>::select(better, &retried.point, &outcome.point);
+                outcome.converged = (outcome.converged & !better) | (retried.converged & better);
+            }
+            // Noise scale and weights are those of the second search's end.
+            problem.solve(&outcome.point);
+            problem.accepted(&outcome.point, doubtful);
             solution = problem.solve(&outcome.point);
         }
         if L > 1 {
@@ -200,8 +240,9 @@ fn start_of<M: Model<L>, const ISA: Isa, const L: usize>(
     illuminations: &[Illumination<Lane<ISA>>],
     optics: &Optics,
     ambient: bool,
+    avoided: Option<Lane<ISA>>,
 ) -> Point<ISA> {
-    let found = start::<M::Seed, ISA>(normals, grey, illuminations, optics, ambient);
+    let found = start::<M::Seed, ISA>(normals, grey, illuminations, optics, ambient, avoided);
     if L == 1 { found } else { start_at::<M, ISA, L>(found.normal, grey, illuminations, optics, ambient) }
 }
 
@@ -211,10 +252,11 @@ fn explore<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L:
     problem: &mut Separable<'_, M, ISA, C, P, L>,
     points: impl Iterator<Item = Point<ISA>>,
     wanted: LaneMask,
-) -> Point<ISA> {
+    steps: usize,
+) -> Outcome<Point<ISA>, ISA> {
     let mut best: Option<Outcome<Point<ISA>, ISA>> = None;
     for point in points {
-        let mut found = minimise(problem, &point, wanted, EXPLORING_STEPS);
+        let mut found = minimise(problem, &point, wanted, steps);
         if let Some(best) = best {
             let better = found.cost.lt(best.cost);
             found.point = Separable::<M, ISA, C, P, L>::select(better, &found.point, &best.point);
@@ -222,7 +264,7 @@ fn explore<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L:
         }
         best = Some(found);
     }
-    best.expect("at least one start").point
+    best.expect("at least one start")
 }
 
 struct Summary<const ISA: Isa> {

@@ -4,7 +4,7 @@
 //! own; finished lanes keep their point while the others go on, or take the next of a queue of problems.
 
 use crate::lanes::{Isa, LANES, Lane, LaneMask, outlined};
-use crate::number::{Mask, Number, Real};
+use crate::number::{Mask, Number, Real, array};
 
 /// A cost, half its descent direction and the Gauss-Newton approximation of half its Hessian at a point.
 #[derive(Clone, Copy)]
@@ -47,6 +47,11 @@ pub trait Objective<const ISA: Isa, const P: usize> {
     /// Parameters that lie at a bound which `descent` pushes against.
     fn blocked(&self, point: &Self::Point, descent: &[Lane<ISA>; P]) -> [LaneMask; P];
     fn select(mask: LaneMask, yes: &Self::Point, no: &Self::Point) -> Self::Point;
+    /// What the damping of each parameter is proportional to: the Hessian's diagonal.
+    #[inline(always)]
+    fn damping_scale(&self, at: &Quadratic<ISA, P>) -> [Lane<ISA>; P] {
+        array!(|i| at.hessian[i][i])
+    }
     /// Called with each point the minimiser has settled on so far; the lanes of `mask` have just moved there.
     fn accepted(&mut self, _point: &Self::Point, _mask: LaneMask) {}
 }
@@ -196,7 +201,7 @@ impl<Point: Copy, const ISA: Isa, const P: usize> Search<Point, ISA, P> {
         // Damping beyond this bound means that no step, however short, lowers the cost: a kink or a flat valley.
         let stuck = self.damping.gt(Lane::splat(1e7));
         let blocked = objective.blocked(&self.point, &self.current.descent);
-        let step = damped_step(&self.current, self.damping, &blocked);
+        let step = damped_step(&self.current, self.damping, &objective.damping_scale(&self.current), &blocked);
         // To first order the step lowers the cost by twice this, to second order by this: too little to be worth a look.
         let mut promised = Lane::splat(0.0);
         for i in 0..P {
@@ -208,18 +213,19 @@ impl<Point: Copy, const ISA: Isa, const P: usize> Search<Point, ISA, P> {
     }
 }
 
-/// Solves (H + damping · diag H) step = descent by LDLᵀ, with blocked parameters held.
+/// Solves (H + damping · diag scale) step = descent by LDLᵀ, with blocked parameters held.
 #[inline(always)]
 fn damped_step<const ISA: Isa, const P: usize>(
     at: &Quadratic<ISA, P>,
     damping: Lane<ISA>,
+    scale: &[Lane<ISA>; P],
     blocked: &[LaneMask; P],
 ) -> [Lane<ISA>; P] {
     let zero = Lane::splat(0.0);
     let mut matrix = at.hessian;
     let mut right = at.descent;
     for i in 0..P {
-        matrix[i][i] = matrix[i][i] * (Lane::splat(1.0) + damping);
+        matrix[i][i] = damping.mul_add(scale[i], matrix[i][i]);
         right[i] = Lane::select(blocked[i], zero, right[i]);
         for j in i + 1..P {
             matrix[i][j] = Lane::select(blocked[i] | blocked[j], zero, matrix[i][j]);
@@ -274,7 +280,6 @@ pub fn inverse<const ISA: Isa, const P: usize>(matrix: &[[Lane<ISA>; P]; P]) -> 
 mod tests {
     use super::*;
     use crate::lanes::{LANES, PLAIN};
-    use crate::number::array;
 
     struct Rosenbrock {
         lower: f32,

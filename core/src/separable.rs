@@ -45,7 +45,7 @@ pub struct Separable<'a, M, const ISA: Isa, const C: usize, const P: usize, cons
     /// Whether weak priors stand in for highlights that no light has shown.
     pub prior: bool,
     /// 1 / degrees of freedom.
-    per_freedom: Lane<ISA>,
+    pub per_freedom: Lane<ISA>,
     /// χ² per degree of freedom at the accepted point and at the one looked at last: the scale of the noise.
     noise_scale: Lane<ISA>,
     trial_noise_scale: Lane<ISA>,
@@ -441,6 +441,14 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
             blocked[2 + i] = low | high;
         }
         blocked
+    }
+
+    /// Of the two tilts of the normal, none by less than a thousandth of the other's. A normal near the plane that the lights
+    /// are symmetric to has no slope across it: damped by its own element alone, every step would go far that way, and fail.
+    #[inline(always)]
+    fn damping_scale(&self, at: &Quadratic<ISA, P>) -> [Lane<ISA>; P] {
+        let least = (at.hessian[0][0] + at.hessian[1][1]) * Lane::splat(1e-3);
+        array!(|i| if i < 2 { at.hessian[i][i].max(least) } else { at.hessian[i][i] })
     }
 
     #[inline(always)]

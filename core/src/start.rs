@@ -150,11 +150,16 @@ pub const ASIDE: [f64; 4] = [0.1, -0.1, 0.35, -0.35];
 
 /// The candidates, moved by an angle along `across`.
 #[inline(always)]
-pub fn aside<const ISA: Isa>(candidates: &[[Lane<ISA>; 3]; 2], across: [f64; 3], angle: f64) -> [[Lane<ISA>; 3]; 2] {
+pub fn aside<const ISA: Isa, const N: usize>(
+    candidates: &[[Lane<ISA>; 3]; N],
+    across: [f64; 3],
+    angle: f64,
+) -> [[Lane<ISA>; 3]; N] {
     array!(|n| bounded(array!(|i| candidates[n][i] + Lane::splat(angle * across[i]))))
 }
 
-/// The best shape of the model's grid at the best of the candidate normals.
+/// The best shape of the model's grid at the best of the candidate normals; of those whose first coordinate is not near
+/// `avoided`, where that is given.
 #[inline(always)]
 pub fn start<M: Model, const ISA: Isa>(
     candidates: &[[Lane<ISA>; 3]],
@@ -162,12 +167,16 @@ pub fn start<M: Model, const ISA: Isa>(
     illuminations: &[Illumination<Lane<ISA>>],
     optics: &Optics,
     ambient: bool,
+    avoided: Option<Lane<ISA>>,
 ) -> Point<ISA> {
     outlined::<ISA, _>(
         #[inline(always)]
-        || start_inline::<M, ISA>(candidates, grey, illuminations, optics, ambient),
+        || start_inline::<M, ISA>(candidates, grey, illuminations, optics, ambient, avoided),
     )
 }
+
+/// Logarithmic widths that differ by less lead to one minimum.
+const NEAR: f64 = 0.8;
 
 /// Weighted sums for radiance = b · l + Ae + As · lobe, where the lobe belongs to a candidate normal and b is free.
 ///
@@ -195,6 +204,7 @@ fn start_inline<M: Model, const ISA: Isa>(
     illuminations: &[Illumination<Lane<ISA>>],
     optics: &Optics,
     ambient: bool,
+    avoided: Option<Lane<ISA>>,
 ) -> Point<ISA> {
     let zero = Lane::splat(0.0);
     let one = Lane::splat(if ambient { 1.0 } else { 0.0 });
@@ -239,14 +249,17 @@ fn start_inline<M: Model, const ISA: Isa>(
             let square = (lobe.square - product(&absorbed, &lobe.cross)).max(lobe.square * Lane::splat(1e-5));
             let magnitude = (lobe.right - product(&absorbed, &sums.right)).max(zero) / square.max(Lane::splat(1e-30));
             let cost = base - magnitude * magnitude * square;
-            let better = cost.lt(best_cost);
+            let coordinates = M::coordinates(shape);
+            let mut better = cost.lt(best_cost);
+            if let Some(avoided) = avoided {
+                better = better & (avoided - Lane::splat(coordinates[0])).abs().gt(Lane::splat(NEAR));
+            }
             best_cost = Lane::select(better, cost, best_cost);
             for i in 0..3 {
                 best.normal[i] = Lane::select(better, normal[i], best.normal[i]);
                 let free = diffuse[i] - magnitude * absorbed[i];
                 free_normal[i] = Lane::select(better, free, free_normal[i]);
             }
-            let coordinates = M::coordinates(shape);
             for i in 0..M::SHAPE.len() {
                 best.coordinates[i] = Lane::select(better, Lane::splat(coordinates[i]), best.coordinates[i]);
             }
