@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +9,6 @@ from impasto import calibrate
 from impasto.calibrate.oecf import Oecf
 from impasto.capture import read_capture
 from impasto.capture.simulate import simulate
-from impasto.output import prepare_folder
 
 RESPONSE = "tone"
 """A curve per channel that no standard formula decodes."""
@@ -55,16 +53,13 @@ def calibrate_camera(folder: Path, *, seed: int, show_progress: bool | None) -> 
         card=shots / "grey_scale_card.tif",
         dark=shots / "dark.tif",
     )
-    # The light file knows a photograph's lamp by its name.
-    cards = folder / "white"
-    prepare_folder(cards)
-    shutil.copy(shots / "white_card.tif", cards / f"{read_capture(photos).lights.names[0]}.tif")
     width, height = _SIZE_PX
     white = calibrate.white(
-        cards,
+        shots / "white_card.tif",
         folder / "white.json",
         box=(width // 3, height // 3, 2 * width // 3, 2 * height // 3),
         lights=photos / "capture.toml",
+        light=read_capture(photos).lights.names[0],
         reflectance=1.0,
         oecf=response.file,
     )
