@@ -29,8 +29,8 @@ def section(subject: Subject) -> Section | None:
             Picture(
                 drawn(draw_curve, curve, subject.fits),
                 "{}, column {}, row {}".format(curve.name.capitalize(), *(curve.pixel or ("?", "?"))),
-                alt=f"Plot of measured and modelled radiance against the {curve.angle_name} at a pixel with "
-                f"a {curve.name}; the errors stand in the table that follows.",
+                alt=f"Plot of measured and modelled radiance against the {curve.angle_name}, {curve.name}; "
+                "the errors stand in the table that follows.",
             )
             for curve in curves
         ],
