@@ -320,7 +320,8 @@ def test_an_experiment_s_pictures_drive_observers_and_stand_beside_the_scale(pai
         assert all(value > 0 for (*_, condition), value in values.items() if condition != "photograph")
     rendered = {key: value for key, value in measured["CIEDE2000"].items() if key[2] != "photograph"}
     trials = tmp_path / "trials.csv"
-    gain = 2 / np.ptp(list(rendered.values()))
+    # Enough for what lies between the models, a part of what lies between the angles, to show in few answers.
+    gain = 8 / np.ptp(list(rendered.values()))
     write_trials(trials, simulate_observers(rendered, model=ObserverModel(gain=gain)))
     result = run("scale", trials, "--errors", folder)
     assert result.exit_code == 0, result.output
