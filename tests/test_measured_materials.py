@@ -1,20 +1,14 @@
 """Measured materials: the study's figures, and the fit's global convergence."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from benchmarks import convergence
 from benchmarks.measured_materials import BASE, MODELS, TOLERANCE, geometric_mean, study
 
-FOLDER = Path(__file__).resolve().parents[2] / "shared" / "reference"
-
 
 @pytest.fixture(scope="module")
-def found():
-    if not (FOLDER / "measured_rms.json").is_file():
-        pytest.skip("the measured materials are not beside the repository")
-    return study(FOLDER)
+def found(shared):
+    return study(shared / "reference")
 
 
 def test_the_papers_finding_holds(found):
@@ -56,10 +50,8 @@ def test_more_parameters_never_cost(found):
 
 
 @pytest.mark.parametrize("setting", convergence.SETTINGS)
-def test_fits_in_rgb_find_the_least_cost_whatever_the_tilt_and_the_view(setting):
+def test_fits_in_rgb_find_the_least_cost_whatever_the_tilt_and_the_view(setting, shared):
     """A sample of the ten thousand of docs/measured-materials.md."""
-    if not (FOLDER / "measured_brdf.npz").is_file():
-        pytest.skip("the measured materials are not beside the repository")
-    ended, least = convergence.measure(FOLDER, setting, 200)
+    ended, least = convergence.measure(shared / "reference", setting, 200)
     assert ended >= convergence.SHARE
     assert least >= convergence.SHARE

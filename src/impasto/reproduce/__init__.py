@@ -71,8 +71,7 @@ def reproduce(
 
     Each sample is a measured material, so the truth is none of the models that are fitted, photographed under
     37 lights on an arm by a camera whose response is measured from a grey scale, with merged exposures. Both
-    models are fitted by the paper's procedure, by its refined
-    form, and by the joint one.
+    models are fitted by the paper's procedure, by its refined form, and by the joint one.
 
     Parameters
     ----------
