@@ -67,22 +67,37 @@ impl Stack<'_> {
     /// The samples of one light at a group of pixels, per channel, as stored.
     #[inline(always)]
     fn stored<const ISA: Isa, const C: usize>(&self, light: usize, pixel: &[usize; LANES]) -> [Lane<ISA>; C] {
+        match self.samples {
+            Samples::U16(values) => self.per_channel(values, light, pixel, f32::from),
+            Samples::F32(values) => self.per_channel(values, light, pixel, |value| value),
+        }
+    }
+
+    #[inline(always)]
+    fn per_channel<T: Copy, const ISA: Isa, const C: usize>(
+        &self,
+        values: &[T],
+        light: usize,
+        pixel: &[usize; LANES],
+        number: impl Fn(T) -> f32,
+    ) -> [Lane<ISA>; C] {
         let mut result = [Lane([0.0; LANES]); C];
+        let first = (light * self.pixels + pixel[0]) * self.channels;
+        // Side by side, as all groups but a tile's last are, and as many channels as there is room for: loops of known
+        // length.
+        if self.channels == C && pixel[LANES - 1] == pixel[0] + LANES - 1 {
+            for (i, values) in values[first..first + LANES * C].chunks_exact(C).enumerate() {
+                for k in 0..C {
+                    result[k].0[i] = number(values[k]);
+                }
+            }
+            return result;
+        }
         for i in 0..LANES {
             let first = (light * self.pixels + pixel[i]) * self.channels;
-            match self.samples {
-                Samples::U16(values) => {
-                    let values = &values[first..first + self.channels];
-                    for k in 0..self.channels {
-                        result[k].0[i] = f32::from(values[k]);
-                    }
-                }
-                Samples::F32(values) => {
-                    let values = &values[first..first + self.channels];
-                    for k in 0..self.channels {
-                        result[k].0[i] = values[k];
-                    }
-                }
+            let values = &values[first..first + self.channels];
+            for k in 0..self.channels {
+                result[k].0[i] = number(values[k]);
             }
         }
         result
@@ -173,7 +188,8 @@ impl<const ISA: Isa, const C: usize> Group<ISA, C> {
             let stored = stack.stored::<ISA, C>(light, &pixel);
             let mut left_out = LaneMask::NONE;
             if let Some(mask) = stack.sample_mask {
-                left_out = LaneMask(array!(|i| u32::from(mask[light * stack.pixels + pixel[i]] == 0).wrapping_sub(1)));
+                // Through a lane: the compiler would keep a mask that is made element by element out of the vectors.
+                left_out = Lane::<ISA>(array!(|i| f32::from(mask[light * stack.pixels + pixel[i]]))).positive();
             }
             let mut any_usable = LaneMask::NONE;
             for channel in 0..stack.channels {
