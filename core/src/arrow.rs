@@ -24,6 +24,15 @@ impl<const ISA: Isa, const C: usize, const L: usize> Magnitudes<ISA, C, L> {
     }
 
     #[inline(always)]
+    pub fn select(mask: LaneMask, yes: &Self, no: &Self) -> Self {
+        Magnitudes {
+            diffuse: array!(|k| Lane::select(mask, yes.diffuse[k], no.diffuse[k])),
+            ambient: array!(|k| Lane::select(mask, yes.ambient[k], no.ambient[k])),
+            specular: array!(|j| Lane::select(mask, yes.specular[j], no.specular[j])),
+        }
+    }
+
+    #[inline(always)]
     pub fn dot(&self, other: &Self) -> Lane<ISA> {
         let mut sum = Lane::splat(0.0);
         for k in 0..C {

@@ -49,6 +49,9 @@ pub struct Separable<'a, M, const ISA: Isa, const C: usize, const P: usize, cons
     /// χ² per degree of freedom at the accepted point and at the one looked at last: the scale of the noise.
     noise_scale: Lane<ISA>,
     trial_noise_scale: Lane<ISA>,
+    /// The magnitudes at these points.
+    magnitudes: Magnitudes<ISA, C, L>,
+    trial_magnitudes: Magnitudes<ISA, C, L>,
     basis: Vec<Basis<Dual<Lane<ISA>, P>, L>>,
     model: PhantomData<M>,
 }
@@ -148,10 +151,18 @@ impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: u
             prior: true,
             noise_scale: Lane::splat(1.0),
             trial_noise_scale: Lane::splat(1.0),
+            magnitudes: Magnitudes::zero(),
+            trial_magnitudes: Magnitudes::zero(),
             per_freedom: Lane::splat(1.0) / freedom.max(Lane::splat(1.0)),
             basis: std::mem::take(&mut scratch.basis),
             model: PhantomData,
         }
+    }
+
+    /// The magnitudes at the point that the minimisation has settled on.
+    #[inline(always)]
+    pub fn magnitudes(&self) -> Magnitudes<ISA, C, L> {
+        self.magnitudes
     }
 
     /// Returns the buffers for the next group.
@@ -304,6 +315,7 @@ impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: u
             quadratic.hessian[p][p] = quadratic.hessian[p][p].max(floor);
         }
         self.trial_noise_scale = quadratic.cost * self.per_freedom;
+        self.trial_magnitudes = magnitudes;
         if self.prior {
             self.add_shape_prior(point, &mut quadratic);
             // The other half of the ridge on the specular magnitudes: their scale follows the shape.
@@ -460,12 +472,12 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
     }
 
     #[inline(always)]
-    fn accepted(&mut self, point: &Point<ISA>, mask: LaneMask) {
+    fn accepted(&mut self, _point: &Point<ISA>, mask: LaneMask) {
         self.noise_scale = Lane::select(mask, self.trial_noise_scale, self.noise_scale);
+        self.magnitudes = Magnitudes::select(mask, &self.trial_magnitudes, &self.magnitudes);
         if !self.robust.is_linear() && mask.any() {
-            let magnitudes = self.solve(point).magnitudes;
             for (light, observation) in self.observations.iter().enumerate() {
-                let residual = self.residual(&magnitudes, light);
+                let residual = self.residual(&self.magnitudes, light);
                 self.robust.reweight(light, &observation.weight, &residual, mask);
             }
         }
