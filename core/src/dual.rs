@@ -155,52 +155,123 @@ impl<R: Real, const P: usize> Number for Dual<R, P> {
 }
 
 /// A dual number that is its own `Real`: all that a model computes with, directions included, may have derivatives.
+///
+/// It knows which parameters it depends on. Which those are follows from the code alone, so that the compiler decides it and
+/// leaves out what would multiply and add zeros.
 #[derive(Clone, Copy, Debug)]
-pub struct Steered<R, const P: usize>(pub Dual<R, P>);
+pub struct Steered<R, const P: usize> {
+    pub value: R,
+    /// Zero where it does not depend on the parameter.
+    pub derivative: [R; P],
+    depends: [bool; P],
+}
 
 impl<R: Real, const P: usize> Steered<R, P> {
     /// As [`Dual::parameter`].
     #[inline(always)]
     pub fn parameter(value: R, index: usize, slope: R) -> Self {
-        Steered(Dual::parameter(value, index, slope))
+        let mut number = Self::given(value);
+        number.derivative[index] = slope;
+        number.depends[index] = true;
+        number
     }
 
-    /// The same number as a function of more parameters, of which its own are the first.
+    /// A number that depends on no parameter.
     #[inline(always)]
-    pub fn widened<const Q: usize>(self) -> Steered<R, Q> {
-        let mut wide = Dual::constant(self.0.value);
-        wide.derivative[..P].copy_from_slice(&self.0.derivative);
-        Steered(wide)
+    pub fn given(value: R) -> Self {
+        Steered { value, derivative: [R::splat(0.0); P], depends: [false; P] }
+    }
+
+    /// f(self), given f's value and its slope there.
+    #[inline(always)]
+    fn chain(self, value: R, slope: R) -> Self {
+        Self::given(value).plus(self, slope)
+    }
+
+    /// The same value, and its derivatives plus those of another number times a factor.
+    #[inline(always)]
+    fn plus(mut self, other: Self, factor: R) -> Self {
+        for i in 0..P {
+            if other.depends[i] {
+                self.derivative[i] = if self.depends[i] {
+                    other.derivative[i].mul_add(factor, self.derivative[i])
+                } else {
+                    other.derivative[i] * factor
+                };
+                self.depends[i] = true;
+            }
+        }
+        self
+    }
+
+    /// The same derivatives, and another value.
+    #[inline(always)]
+    fn valued(mut self, value: R) -> Self {
+        self.value = value;
+        self
     }
 }
 
 impl<R: Real, const P: usize> Neg for Steered<R, P> {
     type Output = Self;
     #[inline(always)]
-    fn neg(self) -> Self {
-        Steered(-self.0)
+    fn neg(mut self) -> Self {
+        for i in 0..P {
+            if self.depends[i] {
+                self.derivative[i] = -self.derivative[i];
+            }
+        }
+        self.valued(-self.value)
     }
 }
 
-macro_rules! steered_operators {
-    ($($trait:ident $operation:ident),*) => {
-        $(impl<R: Real, const P: usize> $trait for Steered<R, P> {
-            type Output = Self;
-            #[inline(always)]
-            fn $operation(self, other: Self) -> Self {
-                Steered(self.0.$operation(other.0))
+impl<R: Real, const P: usize> Add for Steered<R, P> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(mut self, other: Self) -> Self {
+        for i in 0..P {
+            if other.depends[i] {
+                self.derivative[i] =
+                    if self.depends[i] { self.derivative[i] + other.derivative[i] } else { other.derivative[i] };
+                self.depends[i] = true;
             }
-        })*
-    };
+        }
+        self.valued(self.value + other.value)
+    }
 }
-steered_operators!(Add add, Sub sub, Mul mul, Div div);
+
+impl<R: Real, const P: usize> Sub for Steered<R, P> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+impl<R: Real, const P: usize> Mul for Steered<R, P> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        other.chain(self.value * other.value, self.value).plus(self, other.value)
+    }
+}
+
+impl<R: Real, const P: usize> Div for Steered<R, P> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        let inverse = R::splat(1.0) / other.value;
+        let value = self.value * inverse;
+        self.plus(other, -value).chain(value, inverse)
+    }
+}
 
 impl<R: Real, const P: usize> Number for Steered<R, P> {
     type Real = Self;
 
     #[inline(always)]
     fn splat(value: f64) -> Self {
-        Steered(Dual::splat(value))
+        Self::given(R::splat(value))
     }
     #[inline(always)]
     fn constant(value: Self) -> Self {
@@ -212,19 +283,22 @@ impl<R: Real, const P: usize> Number for Steered<R, P> {
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Steered(self.0.sqrt())
+        let root = self.value.sqrt();
+        self.chain(root, R::splat(0.5) / root)
     }
     #[inline(always)]
     fn exp(self) -> Self {
-        Steered(self.0.exp())
+        let value = self.value.exp();
+        self.chain(value, value)
     }
     #[inline(always)]
     fn ln_1p(self) -> Self {
-        Steered(self.0.ln_1p())
+        self.chain(self.value.ln_1p(), R::splat(1.0) / (R::splat(1.0) + self.value))
     }
     #[inline(always)]
     fn mul_add(self, factor: Self, addend: Self) -> Self {
-        Steered(self.0.mul_add(factor.0, addend.0))
+        let value = self.value.mul_add(factor.value, addend.value);
+        addend.plus(self, factor.value).plus(factor, self.value).valued(value)
     }
     #[inline(always)]
     fn scale_add(self, factor: Self, addend: Self) -> Self {
@@ -236,7 +310,14 @@ impl<R: Real, const P: usize> Number for Steered<R, P> {
     }
     #[inline(always)]
     fn select(mask: R::Mask, yes: Self, no: Self) -> Self {
-        Steered(Dual::select(mask, yes.0, no.0))
+        let mut result = Self::given(R::select(mask, yes.value, no.value));
+        for i in 0..P {
+            result.depends[i] = yes.depends[i] | no.depends[i];
+            if result.depends[i] {
+                result.derivative[i] = R::select(mask, yes.derivative[i], no.derivative[i]);
+            }
+        }
+        result
     }
 }
 
@@ -245,6 +326,6 @@ impl<R: Real, const P: usize> Real for Steered<R, P> {
 
     #[inline(always)]
     fn lt(self, other: Self) -> R::Mask {
-        self.0.value.lt(other.0.value)
+        self.value.lt(other.value)
     }
 }

@@ -18,7 +18,6 @@ use crate::record::{FitBlock, Layout, Row, Status, groups};
 use crate::robust::Loss;
 use crate::separable::{Point, Scratch, Separable};
 use crate::start::{Grey, diffuse_normal, grey};
-use std::marker::PhantomData;
 
 /// What holds for the whole sample.
 #[derive(Clone, Copy, Debug)]
@@ -86,13 +85,13 @@ pub struct PaperFit<'a, M, const ISA: Isa, const C: usize> {
     /// The group with the lights near the highlight left out.
     far: Group<ISA, C>,
     grey: Vec<Grey<ISA>>,
+    shape_fit: ShapeFit<M, ISA>,
     left: Left<ISA>,
     /// Groups of a block whose diffuse stage is done, and whose shape is to be fitted.
     diffuse: Vec<Diffuse<ISA, C>>,
     waiting: Vec<Waiting<ISA>>,
     diffuse_scratch: Scratch<ISA, C, 2>,
     scratch: Scratch<ISA, C, 3>,
-    model: PhantomData<M>,
 }
 
 impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
@@ -100,12 +99,15 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
     pub const APPLIES: bool = M::LOBES == 1 && M::SHAPE.len() == 1;
 
     pub fn new(stack: &'a Stack<'a>, colour: &[f64], sample: Sample, options: Options) -> Self {
+        let group = Group::new(stack, options.optics.index);
+        let specular = Lane::splat(sample.specular);
         PaperFit {
+            shape_fit: ShapeFit::new(&group.illuminations, specular, options.optics),
             stack,
             sample,
             options,
             colour: std::array::from_fn(|k| Lane::splat(colour.get(k).copied().unwrap_or(0.0))),
-            group: Group::new(stack, options.optics.index),
+            group,
             far: Group::new(stack, options.optics.index),
             grey: Vec::with_capacity(stack.lights.len()),
             left: Left::new(stack.lights.len()),
@@ -115,7 +117,6 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
                 .collect(),
             diffuse_scratch: Scratch::new(stack.lights.len()),
             scratch: Scratch::new(stack.lights.len()),
-            model: PhantomData,
         }
     }
 
@@ -140,11 +141,10 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
         };
         let nearest = Lane::splat(self.sample.threshold.cos());
         self.far.usable_lights = Lane::splat(0.0);
-        if self.stack.near() {
-            self.far.illuminations.clone_from(&self.group.illuminations);
-        }
         for (light, observation) in self.group.observations.iter().enumerate() {
             let excluded = dot(peak, self.group.illuminations[light].light).gt(nearest);
+            let grey = &mut self.grey[light];
+            grey.weight = Lane::select(excluded, Lane::splat(0.0), grey.weight);
             let mut left = *observation;
             let mut usable = LaneMask::NONE;
             for k in 0..C {
@@ -169,12 +169,12 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
             Separable::new(&self.far, colour, self.options.optics, Loss::Linear, false, &mut self.diffuse_scratch);
         problem.prior = false;
         let outcome = minimise(&mut problem, &begin, enough, self.options.max_steps);
-        let solution = problem.solve(&outcome.point);
+        let magnitudes = problem.magnitudes();
         problem.give_back(&mut self.diffuse_scratch);
         Diffuse {
             normal: outcome.point.normal,
-            magnitude: solution.magnitudes.diffuse,
-            ambient: solution.magnitudes.specular[0],
+            magnitude: magnitudes.diffuse,
+            ambient: magnitudes.specular[0],
             enough,
             converged: outcome.converged,
             samples: self.group.usable_samples,
@@ -188,7 +188,6 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
         self.group.gather(self.stack, first);
         grey(&self.group, &mut self.grey);
         self.leave_out_highlight();
-        grey(&self.far, &mut self.grey);
         let diffuse = if self.options.ambient {
             self.fit_diffuse::<UniformAmbient>([Lane::splat(1.0); C])
         } else {
@@ -203,18 +202,11 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
         diffuse
     }
 
-    #[inline(always)]
-    fn shape_fit<'b>(&self, illuminations: &'b [Illumination<Lane<ISA>>]) -> ShapeFit<'b, M, ISA> {
-        ShapeFit::new(illuminations, Lane::splat(self.sample.specular), self.options.optics)
-    }
-
     /// Step 5, literally, for all groups of a block.
     #[inline(always)]
     fn fit_shapes(&mut self) {
-        let fit =
-            ShapeFit::<M, ISA>::new(&self.group.illuminations, Lane::splat(self.sample.specular), self.options.optics);
         let waiting = &mut self.waiting[..self.diffuse.len()];
-        ShapeQueue::run(fit, waiting, &mut self.left, self.options.max_steps);
+        ShapeQueue::run(&self.shape_fit, waiting, &mut self.left, self.options.max_steps);
     }
 
     /// What step 5 found for a group.
@@ -231,7 +223,7 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
             view_tilt: found.point.view,
             cost: found.cost,
             converged: found.converged,
-            at_bound: self.shape_fit(&self.group.illuminations).at_bound(&found.point),
+            at_bound: self.shape_fit.at_bound(&found.point),
         }
     }
 
@@ -239,22 +231,22 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
     #[inline(always)]
     fn refine(&mut self, diffuse: &Diffuse<ISA, C>) -> Shape<ISA, C> {
         self.left.take(&self.group, diffuse.normal, diffuse.magnitude, self.colour);
-        let begin = self.shape_fit(&self.group.illuminations).start_out_of_plane(&self.left);
+        let begin = self.shape_fit.start_out_of_plane(&self.left);
         let mut problem: Separable<'_, M, ISA, C, 3> =
             Separable::new(&self.group, self.colour, self.options.optics, Loss::Linear, false, &mut self.scratch);
         problem.prior = false;
         problem.fixed_specular = Some([Lane::splat(self.sample.specular)]);
         let outcome = minimise(&mut problem, &begin, diffuse.enough, self.options.max_steps);
-        let solution = problem.solve(&outcome.point);
-        let at_bound = problem.at_bound(&outcome.point, &solution.magnitudes);
+        let magnitudes = problem.magnitudes();
+        let at_bound = problem.at_bound(&outcome.point, &magnitudes);
         problem.give_back(&mut self.scratch);
         let view = self.group.illuminations[0].view;
         Shape {
             normal: outcome.point.normal,
-            magnitude: solution.magnitudes.diffuse,
+            magnitude: magnitudes.diffuse,
             shape_log: outcome.point.coordinates[0],
             view_tilt: Lane(array!(|i| view[0].0[i].atan2(view[2].0[i]))),
-            cost: solution.quadratic.cost,
+            cost: outcome.cost,
             converged: outcome.converged,
             at_bound,
         }
@@ -316,11 +308,10 @@ impl<M: Model, const ISA: Isa, const C: usize> FitBlock for PaperFit<'_, M, ISA,
                 self.write(&diffuse, &fitted, rows, status);
                 continue;
             }
-            let fit = self.shape_fit(&self.group.illuminations);
             let waiting = &mut self.waiting[number];
             waiting.left.take(&self.group, diffuse.normal, diffuse.magnitude, self.colour);
             waiting.wanted = diffuse.enough;
-            waiting.point = fit.start(&waiting.left);
+            waiting.point = self.shape_fit.start(&waiting.left);
             self.diffuse.push(diffuse);
         }
         if self.sample.refined {

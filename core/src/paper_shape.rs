@@ -3,7 +3,7 @@
 //! Free are the view's tilt θv in the arm's plane (φv = 0), the logarithm of the shape parameter, and an empirical tilt φn
 //! of the normal out of that plane.
 
-use crate::dual::{Dual, Steered};
+use crate::dual::Steered;
 use crate::geometry::{Illumination, dot, normalise};
 use crate::lanes::{Isa, LANES, Lane, LaneMask, outlined};
 use crate::minimise::{Objective, Outcome, Quadratic, Queue, minimise_all};
@@ -17,8 +17,8 @@ use std::marker::PhantomData;
 const VIEW_RANGE: f64 = 0.35;
 /// φn lies between 0 and this, radians: its sign cannot be seen.
 const PHI_MAX: f64 = 0.7;
-/// Out-of-plane tilts that the search starts from, radians.
-const PHI_STARTS: [f64; 3] = [0.0, 0.04, 0.12];
+/// Out-of-plane tilts that the search starts from, radians: not 0, where the cost has no slope to leave it by.
+const PHI_STARTS: [f64; 2] = [0.03, 0.12];
 
 #[derive(Clone, Copy, Debug)]
 pub struct Tilts<const ISA: Isa> {
@@ -112,10 +112,11 @@ impl<const ISA: Isa> Left<ISA> {
     }
 }
 
-/// The fit of the shape: what it is for all pixels, under lights and a view that they share.
-#[derive(Clone, Copy)]
-pub struct ShapeFit<'a, M, const ISA: Isa> {
-    illuminations: &'a [Illumination<Lane<ISA>>],
+/// The fit of the shape: what it is for all pixels, under distant lights and a view that they share.
+pub struct ShapeFit<M, const ISA: Isa> {
+    illuminations: Vec<Illumination<Lane<ISA>>>,
+    /// The same for the view's θv at φv = 0.
+    in_plane: Vec<Illumination<Lane<ISA>>>,
     specular: Lane<ISA>,
     optics: Optics,
     /// θv and φv as calibrated.
@@ -130,26 +131,34 @@ fn rotated<R: Real>(normal: [R; 3], sine: R, cosine: R) -> [R; 3] {
     [cosine * normal[0] / in_plane, sine, cosine * normal[2] / in_plane]
 }
 
-impl<'a, M: Model, const ISA: Isa> ShapeFit<'a, M, ISA> {
-    #[inline(always)]
-    pub fn new(illuminations: &'a [Illumination<Lane<ISA>>], specular: Lane<ISA>, optics: Optics) -> Self {
+impl<M: Model, const ISA: Isa> ShapeFit<M, ISA> {
+    pub fn new(illuminations: &[Illumination<Lane<ISA>>], specular: Lane<ISA>, optics: Optics) -> Self {
         let view = illuminations[0].view;
         let theta = Lane(array!(|i| view[0].0[i].atan2(view[2].0[i])));
         let phi = Lane(array!(|i| view[1].0[i].asin()));
-        ShapeFit { illuminations, specular, optics, view: (theta, phi), model: PhantomData }
+        let (sine, cosine) = sine_cosine(theta);
+        let in_plane = [sine, Lane::splat(0.0), cosine];
+        ShapeFit {
+            illuminations: illuminations.to_vec(),
+            in_plane: illuminations.iter().map(|at| Illumination::new(at.light, in_plane, optics.index)).collect(),
+            specular,
+            optics,
+            view: (theta, phi),
+            model: PhantomData,
+        }
     }
 
-    /// The shape of the grid and the tilt out of the plane, of `tilts`, that fit best, seen from `view`.
+    /// The shape of the grid and the tilt out of the plane, of `tilts`, that fit best.
     #[inline(always)]
     fn search(
         &self,
         left: &Left<ISA>,
-        view: Option<[Lane<ISA>; 3]>,
+        illuminations: &[Illumination<Lane<ISA>>],
         tilts: [Lane<ISA>; PHI_STARTS.len()],
     ) -> (Lane<ISA>, Lane<ISA>) {
         outlined::<ISA, _>(
             #[inline(always)]
-            || self.search_inline(left, view, tilts),
+            || self.search_inline(left, illuminations, tilts),
         )
     }
 
@@ -157,19 +166,15 @@ impl<'a, M: Model, const ISA: Isa> ShapeFit<'a, M, ISA> {
     fn search_inline(
         &self,
         left: &Left<ISA>,
-        view: Option<[Lane<ISA>; 3]>,
+        illuminations: &[Illumination<Lane<ISA>>],
         tilts: [Lane<ISA>; PHI_STARTS.len()],
     ) -> (Lane<ISA>, Lane<ISA>) {
         let normals: [_; PHI_STARTS.len()] = array!(|i| left.normal(tilts[i]));
         let mut costs = [[Lane::splat(0.0); MAX_STARTS]; PHI_STARTS.len()];
-        for (remainder, calibrated) in left.remainders.iter().zip(self.illuminations) {
-            let mut at = *calibrated;
-            if let Some(view) = view {
-                at = Illumination::new(at.light, view, self.optics.index);
-            }
+        for (remainder, at) in left.remainders.iter().zip(illuminations) {
             for (normal, costs) in normals.iter().zip(&mut costs) {
                 for (cost, shape) in costs.iter_mut().zip(M::STARTS) {
-                    let lobe = M::basis(*normal, &[Lane::splat(shape[0])], &at, &self.optics).specular[0];
+                    let lobe = M::basis(*normal, &[Lane::splat(shape[0])], at, &self.optics).specular[0];
                     let residual = remainder.value - self.specular * lobe;
                     *cost = (remainder.weight * residual).mul_add(residual, *cost);
                 }
@@ -191,9 +196,7 @@ impl<'a, M: Model, const ISA: Isa> ShapeFit<'a, M, ISA> {
     /// The best of a grid of shapes and φn, with θv as calibrated.
     #[inline(always)]
     pub fn start(&self, left: &Left<ISA>) -> Tilts<ISA> {
-        let (sine, cosine) = sine_cosine(self.view.0);
-        let (shape_log, phi) =
-            self.search(left, Some([sine, Lane::splat(0.0), cosine]), array!(|i| Lane::splat(PHI_STARTS[i])));
+        let (shape_log, phi) = self.search(left, &self.in_plane, array!(|i| Lane::splat(PHI_STARTS[i])));
         Tilts { view: self.view.0, shape_log, phi }
     }
 
@@ -203,7 +206,7 @@ impl<'a, M: Model, const ISA: Isa> ShapeFit<'a, M, ISA> {
     pub fn start_out_of_plane(&self, left: &Left<ISA>) -> Point<ISA> {
         let half = self.view.1 * Lane::splat(0.5);
         let away = Lane::select(half.lt(Lane::splat(0.0)), Lane::splat(1.0), Lane::splat(-1.0));
-        let (shape, phi) = self.search(left, None, array!(|i| half + away * Lane::splat(PHI_STARTS[i])));
+        let (shape, phi) = self.search(left, &self.illuminations, array!(|i| half + away * Lane::splat(PHI_STARTS[i])));
         let mut coordinates = [Lane::splat(0.0); MAX_SHAPE];
         coordinates[0] = shape;
         Point { normal: normalise(left.normal(phi)), coordinates }
@@ -211,12 +214,11 @@ impl<'a, M: Model, const ISA: Isa> ShapeFit<'a, M, ISA> {
 
     #[inline(always)]
     fn quadratic(&self, left: &Left<ISA>, point: &Tilts<ISA>) -> Quadratic<ISA, 3> {
-        // The directions carry the derivative by the view; they depend on nothing else.
         let (sine, cosine) = sine_cosine(point.view);
-        let view: [Steered<_, 1>; 3] =
+        let view: [Steered<_, 3>; 3] =
             [Steered::parameter(sine, 0, cosine), Steered::splat(0.0), Steered::parameter(cosine, 0, -sine)];
         let shape = point.shape_log.exp();
-        let shape = Steered::<_, 3>::parameter(shape, 1, shape);
+        let shape = Steered::parameter(shape, 1, shape);
         let (sine, cosine) = sine_cosine(point.phi);
         let normal = rotated(left.normal, sine, cosine);
         let slope = rotated(left.normal, cosine, -sine);
@@ -224,13 +226,10 @@ impl<'a, M: Model, const ISA: Isa> ShapeFit<'a, M, ISA> {
 
         let mut quadratic = Quadratic::zero();
         quadratic.cost = left.constant;
-        for (remainder, calibrated) in left.remainders.iter().zip(self.illuminations) {
-            let light = array!(|i| Steered(Dual::constant(calibrated.light[i])));
-            let at = Illumination::new(light, view, self.optics.index).map(
-                #[inline(always)]
-                |number| number.widened(),
-            );
-            let Steered(lobe) = M::basis(normal, &[shape], &at, &self.optics).specular[0];
+        for (remainder, calibrated) in left.remainders.iter().zip(&self.illuminations) {
+            let light = array!(|i| Steered::given(calibrated.light[i]));
+            let at = Illumination::new(light, view, self.optics.index);
+            let lobe = M::basis(normal, &[shape], &at, &self.optics).specular[0];
             let slopes = lobe.derivative;
             let residual = remainder.value - self.specular * lobe.value;
             quadratic.cost = (remainder.weight * residual).mul_add(residual, quadratic.cost);
@@ -298,7 +297,7 @@ impl<const ISA: Isa> Waiting<ISA> {
 
 /// The pixels of several groups, fitted side by side, each lane with the next when it has done with one.
 pub struct ShapeQueue<'a, M, const ISA: Isa> {
-    fit: ShapeFit<'a, M, ISA>,
+    fit: &'a ShapeFit<M, ISA>,
     waiting: &'a mut [Waiting<ISA>],
     /// The next pixel, counted over the groups.
     next: usize,
@@ -310,7 +309,7 @@ pub struct ShapeQueue<'a, M, const ISA: Isa> {
 impl<'a, M: Model, const ISA: Isa> ShapeQueue<'a, M, ISA> {
     /// Fits the wanted pixels of all groups; `lanes` is a buffer.
     #[inline(always)]
-    pub fn run(fit: ShapeFit<'a, M, ISA>, waiting: &'a mut [Waiting<ISA>], lanes: &'a mut Left<ISA>, max_steps: usize) {
+    pub fn run(fit: &'a ShapeFit<M, ISA>, waiting: &'a mut [Waiting<ISA>], lanes: &'a mut Left<ISA>, max_steps: usize) {
         let anywhere = waiting[0].point;
         let mut queue = ShapeQueue { fit, waiting, next: 0, pixels: [0; LANES], lanes };
         minimise_all(&mut queue, &anywhere, max_steps);
