@@ -69,6 +69,7 @@ def _random_residual(channels):
         "weights": rng.normal(0, 0.02, (COMPONENTS, channels, 24)).tolist(),
         "hull": hull_of(direction).tolist(),
         "fade": 0.17,
+        "strength": {"length": 0.5, "noise": 0.1, "weights": rng.normal(0, 0.1, (channels, 24)).tolist()},
     }
 
 

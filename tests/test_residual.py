@@ -9,6 +9,7 @@ import impasto
 from impasto.errors import OptionError
 from impasto.fit import FitOptions
 from impasto.fit.light_process import LightProcess, compress, hull_of
+from impasto.fit.strength import find_strength
 from impasto.geometry import arm_direction, dome_direction
 from impasto.residual import ZERO, ResidualTerm, decode, encode, kernel
 from impasto.store import open_fit, open_stack
@@ -90,7 +91,18 @@ def test_the_term_fades_to_nothing_outside_the_hull():
 def test_added_as_docs_store_md_says():
     direction = lights(12)
     weights, step = RNG.normal(size=(3, 3, 12)), np.array([0.01, 0.02, 0.005])
-    term = ResidualTerm(direction, 0.4, weights, step, 0.004, hull_of(direction), 0.17)
+    strength = RNG.normal(0.0, 0.2, size=(3, 12))
+    term = ResidualTerm(
+        direction,
+        0.4,
+        weights,
+        step,
+        0.004,
+        hull_of(direction),
+        0.17,
+        strength_length=0.6,
+        strength_weights=strength,
+    )
     codes = RNG.integers(ZERO - 9, ZERO + 9, size=(7, 3)).astype(np.uint16)
     light = direction[:2]
     irradiance = np.array([[[1.0, 1.2, 0.8]], [[2.0, 2.0, 2.0]]], np.float32)
@@ -104,7 +116,43 @@ def test_added_as_docs_store_md_says():
         value = np.sqrt(model[place] / irradiance[which, 0, channel] + 0.004) - np.sqrt(0.004)
         value += ((codes[pixel].astype(float) - ZERO) * step) @ (weights[:, channel] @ near)
         expected = ((max(value, 0) + np.sqrt(0.004)) ** 2 - 0.004) * irradiance[which, 0, channel]
+        around = np.exp(-np.square(light[which] - direction).sum(axis=1) / (2 * 0.6**2))
+        expected *= np.exp(strength[channel] @ around)
         np.testing.assert_allclose(got[place], expected, rtol=2e-4, atol=1e-5)
+
+
+def test_strengths_that_are_smooth_over_direction_are_told_to_lights_between():
+    direction, between = lights(60), lights(37, zenith_deg=55)
+
+    def smooth(at):
+        return 0.2 * np.sin(4.0 * at[:, :1] + [0.0, 0.3, 0.6]) * at[:, 1:2]
+
+    told = find_strength(direction, smooth(direction) + RNG.normal(0.0, 0.01, (60, 1)))
+    term = ResidualTerm.of({"residual": {**plain_term(direction), "strength": told}})
+    found = np.log(term.strength(between))
+    assert np.sqrt(np.square(found - smooth(between)).mean()) < 0.3 * smooth(between).std()
+    far = dome_direction(np.radians([88.0]), [1.0])
+    assert term.strength(far) == pytest.approx(1.0)
+
+
+def test_strengths_that_have_nothing_to_do_with_direction_are_not_told():
+    rng = np.random.default_rng(11)
+    draws = [find_strength(lights(40), rng.normal(0.0, 0.1, (40, 1)) + np.zeros(3)) for _ in range(50)]
+    assert sum(told is not None for told in draws) <= 2
+
+
+def plain_term(direction):
+    """Return the attribute of a term that adds nothing."""
+    return {
+        "components": 1,
+        "step": [1.0],
+        "toe": 0.01,
+        "direction": direction.tolist(),
+        "length": 0.3,
+        "weights": np.zeros((1, 3, len(direction))).tolist(),
+        "hull": hull_of(direction).tolist(),
+        "fade": 0.17,
+    }
 
 
 def fitted(painting, tmp_path, **options):

@@ -77,6 +77,10 @@ class ResidualTerm:
         Sine of the angle over which the term fades outside of the hull.
     table : ndarray of shape (256,), float32, or None
         Of a published store, what stands for a code in place of its distance from `ZERO`.
+    strength_length : float
+        Length of the kernel of the strengths.
+    strength_weights : ndarray of shape (C, N) or None
+        Of the logarithm of how strong the lights around a direction were; None where that is not told.
     """
 
     direction: Array
@@ -87,6 +91,8 @@ class ResidualTerm:
     hull: Array
     fade: float
     table: Values | None = None
+    strength_length: float = 1.0
+    strength_weights: Array | None = None
 
     @classmethod
     def of(cls, attributes: Mapping[str, Any]) -> ResidualTerm | None:
@@ -99,6 +105,7 @@ class ResidualTerm:
             return np.array(found[name], np.float64)
 
         published = "table" in found
+        strength = found.get("strength")
         return cls(
             direction=array("direction"),
             length=float(found["length"]),
@@ -108,6 +115,11 @@ class ResidualTerm:
             hull=array("hull"),
             fade=float(found["fade"]),
             table=array("table").astype(np.float32) if published else None,
+            **(
+                {"strength_length": strength["length"], "strength_weights": np.array(strength["weights"])}
+                if strength
+                else {}
+            ),
         )
 
     @property
@@ -126,6 +138,14 @@ class ResidualTerm:
         """Return the functions at light directions (L, 3), with the fading, as (L, K, C)."""
         values = np.einsum("kcn,ln->lkc", self.weights, kernel(direction, self.direction, self.length))
         result: Array = values * self.share(direction)[:, None, None]
+        return result
+
+    def strength(self, direction: ArrayLike) -> Array:
+        """Return how strong the lights around directions (L, 3) were, with the fading, as (L, 1 or C)."""
+        if self.strength_weights is None:
+            return np.ones((len(np.asarray(direction)), 1))
+        told = kernel(direction, self.direction, self.strength_length) @ self.strength_weights.T
+        result: Array = np.exp(told * self.share(direction)[:, None])
         return result
 
     def coefficients(self, codes: NDArray[np.unsignedinteger]) -> Values:
@@ -153,8 +173,9 @@ class ResidualTerm:
             Of the lights at the pixels: intensity times fall-off.
         """
         basis = self.basis(direction) * self.step[:, None]
+        strength = self.strength(direction)[:, None].astype(np.float32)
         lights, pixels, channels = radiance.shape
-        if not lights or not basis.any():
+        if not lights or not (basis.any() or np.any(strength != 1.0)):
             return
         table = basis.transpose(1, 0, 2).reshape(self.components, -1).astype(np.float32)
         # Blocks that stay in the processor's cache, on all processors.
@@ -169,7 +190,7 @@ class ResidualTerm:
             values += added
             result = decode(values, self.toe)
             with np.errstate(over="ignore"):  # the narrowest lobes reach the largest numbers that there are
-                result *= share
+                result *= share * strength
             np.copyto(radiance[:, part], result, where=np.isfinite(radiance[:, part]) & ~dark)
 
         with ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="residual") as pool:

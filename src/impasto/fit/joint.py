@@ -23,6 +23,7 @@ from impasto.fit.remainder import (
 )
 from impasto.fit.sample import Sample, sample_pixels
 from impasto.fit.self_calibration import Calibration, self_calibrate
+from impasto.fit.strength import find_strength
 from impasto.fit.tile import fit_tile
 from impasto.geometry import Lights, position_mm
 from impasto.models import ModelSpec
@@ -119,6 +120,7 @@ class Joint:
         if self._options.residual or self._options.calibrates:
             sample = _SampledPixels(self, sample_pixels(self._stack, self.lights, show_progress))
             toe = sample.toe
+            strength = None
             if self._options.calibrates:
                 calibration = self_calibrate(
                     sample,
@@ -128,6 +130,7 @@ class Joint:
                 )
                 self._selected = calibration.lights
                 attributes["self_calibration"] = calibration.attributes()
+                strength = find_strength(calibration.lights.direction, calibration.departure)
                 notes += _calibration_notes(calibration)
             if self._options.residual:
                 self._remainder = find_remainder(
@@ -137,6 +140,8 @@ class Joint:
                     self._options.residual_components,
                 )
                 attributes["residual"] = self._remainder.attributes
+                if strength:
+                    attributes["residual"]["strength"] = strength
                 notes += _residual_notes(self._remainder.attributes)
         return Findings(attributes, notes)
 
@@ -220,7 +225,9 @@ class _SampledPixels:
     def fit(self, lights: Lights) -> stores.Maps:
         return self.procedure.fit_pixels(self.sample.values, self.sample.row, self.sample.column, lights)
 
-    def radiance(self, maps: stores.Maps, lights: Lights) -> NDArray[np.float32]:
+    def radiance(self, maps: stores.Maps, lights: Lights, *, highlights: bool = True) -> NDArray[np.float32]:
+        if not highlights and "specular" in maps:
+            maps = {**maps, "specular": np.zeros_like(maps["specular"])}
         return self.procedure.render(self.procedure.pixels(maps, self.sample.row, self.sample.column), lights)
 
     def measured(self) -> NDArray[np.float32]:
@@ -249,7 +256,7 @@ class _SampledPixels:
 
 
 def _calibration_notes(found: Calibration) -> tuple[str, ...]:
-    departure = 100 * np.abs(np.exp(np.log(found.gain / found.trend).mean(axis=1)) - 1)
+    departure = 100 * np.abs(np.exp(found.departure.mean(axis=1)) - 1)
     directions: tuple[str, ...] = ()
     if found.directions:
         error = found.directions["left_out_db"]

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from impasto.geometry import Array, Lights, zenith_azimuth
 from impasto.residual import kernel
@@ -142,16 +141,12 @@ def _linearise(pixels: PixelFit, lights: Lights, axes: Array) -> _Linearised:
     measured = pixels.measured().mean(axis=2, dtype=np.float64)
     maps = pixels.fit(lights)
 
-    def render(under: Lights, which: dict[str, NDArray[np.generic]] = maps) -> Array:
-        mean: Array = pixels.radiance(which, under).mean(axis=2, dtype=np.float64)
+    def render(under: Lights, *, highlights: bool = True) -> Array:
+        rendered = pixels.radiance(maps, under, highlights=highlights)
+        mean: Array = rendered.mean(axis=2, dtype=np.float64)
         return mean
 
-    radiance = render(lights)
-    matte = (
-        render(lights, {**maps, "specular": np.zeros_like(maps["specular"])})
-        if "specular" in maps
-        else radiance
-    )
+    radiance, matte = render(lights), render(lights, highlights=False)
     floor = 0.05 * float(np.nanmean(measured))
     usable = (measured > floor) & (radiance > floor) & ~pixels.clipped().any(axis=2)
     slope = np.ones((3, *radiance.shape))

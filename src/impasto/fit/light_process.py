@@ -66,9 +66,14 @@ def choose_process(direction: Array, moments: Array) -> LightProcess:
     The geometric mean is the mean in decibels: it weighs lights near the highlight, where errors are large,
     like all others.
     """
-    candidates = [LightProcess(direction, length, noise) for length in _LENGTHS for noise in _NOISES]
-    errors = [np.log(process.left_out(moments) + 1e-12).mean() for process in candidates]
-    return candidates[int(np.argmin(errors))]
+    processes = usual_processes(direction)
+    errors = [np.log(process.left_out(moments) + 1e-12).mean() for process in processes]
+    return processes[int(np.argmin(errors))]
+
+
+def usual_processes(direction: Array) -> list[LightProcess]:
+    """Return the processes that are tried: lengths from 0.1 to 1.6, noise from a hundredth to three times."""
+    return [LightProcess(direction, length, noise) for length in _LENGTHS for noise in _NOISES]
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,9 @@ WORTH_DB = 0.1
 # Rounds of fitting the pixels and then the lights; the strengths change by less than 1 % in the last.
 _ROUNDS = 3
 
+# A sample with this share of highlight counts half: what a model gets wrong there is not the light's.
+_HIGHLIGHT = 0.05
+
 Values = NDArray[np.float32]
 
 
@@ -28,8 +31,8 @@ class PixelFit(Protocol):
     def fit(self, lights: Lights) -> stores.Maps:
         """Return the maps of the pixels, fitted as if their photographs had been taken under `lights`."""
 
-    def radiance(self, maps: stores.Maps, lights: Lights) -> Values:
-        """Return the radiance (L, N, C) that maps give under lights."""
+    def radiance(self, maps: stores.Maps, lights: Lights, *, highlights: bool = True) -> Values:
+        """Return the radiance (L, N, C) that maps give under lights, with or without their highlights."""
 
     def measured(self) -> Values:
         """Return the radiance (L, N, C) of the photographs, NaN where it is missing."""
@@ -62,6 +65,11 @@ class Calibration:
     gain: Array
     trend: Array
     directions: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def departure(self) -> Array:
+        """Logarithms (L, C) of the strengths that the photographs are divided by."""
+        return np.log(self.gain / self.trend)
 
     def attributes(self) -> dict[str, Any]:
         """Return what was found, for the attributes of a fit."""
@@ -114,7 +122,7 @@ def find_strengths(pixels: PixelFit, lights: Lights) -> Calibration:
     -----
     A strength is the weighted median, over the pixels, of measured over modelled radiance; the weight is the
     smaller of both, which keeps highlights that the model misses and shadows that it does not know from
-    counting.
+    counting, and less where the model has a highlight.
     """
     measured, clipped = pixels.measured(), pixels.clipped()
     stated = np.broadcast_to(lights.intensity, (len(lights), measured.shape[2])).astype(np.float64)
@@ -122,15 +130,19 @@ def find_strengths(pixels: PixelFit, lights: Lights) -> Calibration:
     used = replace(lights, intensity=stated)
     log_gain = trend = np.zeros(stated.shape)
     for _ in range(_ROUNDS + 1):
-        radiance = pixels.radiance(pixels.fit(used), used)
-        log_gain = log_gain - trend + _log_strength(measured, radiance, clipped, floor)
+        maps = pixels.fit(used)
+        radiance = pixels.radiance(maps, used)
+        matte = pixels.radiance(maps, used, highlights=False)
+        log_gain = log_gain - trend + _log_strength(measured, radiance, matte, clipped, floor)
         log_gain -= np.median(log_gain)
         trend = np.stack([_trend(lights.direction, column) for column in log_gain.T], axis=1)
         used = replace(used, intensity=stated * np.exp(log_gain - trend))
     return Calibration(used, np.exp(log_gain), np.exp(trend))
 
 
-def _log_strength(measured: Values, radiance: Values, clipped: NDArray[np.bool_], floor: float) -> Array:
+def _log_strength(
+    measured: Values, radiance: Values, matte: Values, clipped: NDArray[np.bool_], floor: float
+) -> Array:
     """Return for each light and channel the weighted median of ln(measured / radiance), shape (L, C)."""
     result = np.zeros((measured.shape[0], measured.shape[2]))
     usable = (measured > floor) & (radiance > floor) & ~clipped
@@ -140,7 +152,9 @@ def _log_strength(measured: Values, radiance: Values, clipped: NDArray[np.bool_]
         if here.sum() < 16:
             continue
         one, other = measured[light, here, channel], radiance[light, here, channel]
-        result[place] = _weighted_median(np.log(one / other), np.minimum(one, other))
+        highlight = 1.0 - matte[light, here, channel] / other
+        known = 1.0 / (1.0 + np.square(highlight / _HIGHLIGHT))
+        result[place] = _weighted_median(np.log(one / other), np.minimum(one, other) * known)
     return result
 
 

@@ -2,20 +2,45 @@
 
 import type { ResidualTerm } from "../store/attributes";
 
+const dot = (a: readonly number[], b: readonly number[]) =>
+  a.reduce((sum, value, i) => sum + value * b[i]!, 0);
+
+/** Returns how much of the term is left at a light's direction. */
+function share(term: ResidualTerm, direction: readonly number[]): number {
+  const outside = Math.max(...term.hull.map((side) => -dot(side, direction)));
+  const part = Math.min(Math.max(outside / term.fade, 0), 1);
+  return 1 - part * part * (3 - 2 * part);
+}
+
+/** Returns for each channel the sum of weight times kernel over the fitted lights. */
+function series(
+  term: ResidualTerm,
+  channels: readonly (readonly number[])[],
+  length: number,
+  direction: readonly number[],
+): [number, number, number] {
+  // For unit vectors |l − d|² = 2 − 2 l·d.
+  const kernel = term.direction.map((light) =>
+    Math.exp((Math.min(dot(light, direction), 1) - 1) / length ** 2),
+  );
+  const values = channels.map((weights) => dot(weights, kernel));
+  return values.length === 3 ? [values[0]!, values[1]!, values[2]!] : [values[0]!, values[0]!, values[0]!];
+}
+
 /** Returns the functions of a light's direction, with their fading: three channels for each component. */
 export function residualBasis(term: ResidualTerm, direction: readonly number[]): number[][] {
-  const dot = (other: readonly number[]) => other.reduce((sum, value, i) => sum + value * direction[i]!, 0);
-  const outside = Math.max(...term.hull.map((side) => -dot(side)));
-  const part = Math.min(Math.max(outside / term.fade, 0), 1);
-  const share = 1 - part * part * (3 - 2 * part);
-  // For unit vectors |l − d|² = 2 − 2 l·d.
-  const kernel = term.direction.map((light) => Math.exp((Math.min(dot(light), 1) - 1) / term.length ** 2));
-  return term.weights.map((channels) => {
-    const values = channels.map(
-      (weights) => share * weights.reduce((sum, weight, n) => sum + weight * kernel[n]!, 0),
-    );
-    return values.length === 3 ? values : [values[0]!, values[0]!, values[0]!];
-  });
+  const left = share(term, direction);
+  return term.weights.map((channels) =>
+    series(term, channels, term.length, direction).map((value) => left * value),
+  );
+}
+
+/** Returns how strong the lights around a direction were, in three channels. */
+export function residualStrength(term: ResidualTerm, direction: readonly number[]): number[] {
+  if (!term.strength) return [1, 1, 1];
+  const { length, weights } = term.strength;
+  const left = share(term, direction);
+  return series(term, weights, length, direction).map((value) => Math.exp(left * value));
 }
 
 /** Adds a term to the radiance per unit of irradiance in one channel. */
@@ -31,7 +56,7 @@ struct Residual { float coefficient[${Math.max(components, 1)}]; };
 uniform usampler2D residualCodes;  // the tile's coefficients
 uniform int residualBlocks;        // texels of four codes per pixel, 0 where the tile is not there yet
 uniform sampler2D residualTable;   // the coefficient of each code
-uniform sampler2D residualBasis;   // per component and light
+uniform sampler2D residualBasis;   // per component and light; then the strength of the lights around it
 uniform float toe;
 
 Residual residual(ivec2 at) {
@@ -51,7 +76,7 @@ vec3 withResidual(vec3 radiance, Residual r, int light) {
   for (int k = 0; k < ${components}; k++) added += r.coefficient[k] * texelFetch(residualBasis, ivec2(k, light), 0).rgb;
   float root = sqrt(toe);
   vec3 value = max(sqrt(max(radiance, vec3(0.0)) + toe) - root + added, vec3(0.0)) + root;
-  return value * value - toe;
+  return (value * value - toe) * texelFetch(residualBasis, ivec2(${components}, light), 0).rgb;
 }
 `;
 }

@@ -52,6 +52,8 @@ export interface ResidualTerm {
   readonly weights: readonly (readonly (readonly number[])[])[];
   readonly hull: readonly (readonly number[])[];
   readonly fade: number;
+  /** How strong the lights around a direction were: length of the kernel, and weights per channel. */
+  readonly strength?: { readonly length: number; readonly weights: readonly (readonly number[])[] };
 }
 
 export interface PhotographLight {
@@ -123,7 +125,7 @@ function drawable(entry: ModelEntry): boolean {
 
 /** Whether a residual term has all its numbers. */
 function isWhole(term: ResidualTerm, channels: number): boolean {
-  const { components, direction, weights, hull } = term;
+  const { components, direction, weights, hull, strength } = term;
   const numbers = (list: unknown, count: number) =>
     Array.isArray(list) && list.length === count && list.every(Number.isFinite);
   const vectors = (list: unknown) => Array.isArray(list) && list.every((each) => numbers(each, 3));
@@ -135,6 +137,10 @@ function isWhole(term: ResidualTerm, channels: number): boolean {
     [term.toe, term.length, term.fade].every((value) => value > 0) &&
     vectors(direction) &&
     vectors(hull) &&
+    (!strength ||
+      (strength.length > 0 &&
+        strength.weights.length === channels &&
+        strength.weights.every((values) => numbers(values, direction.length)))) &&
     weights?.length === components &&
     weights.every(
       (each) => each.length === channels && each.every((values) => numbers(values, direction.length)),
