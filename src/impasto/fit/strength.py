@@ -40,5 +40,5 @@ def find_strength(direction: Array, departure: Array) -> dict[str, Any] | None:
     process = processes[int(np.argmin(errors))]
     if not min(errors) < _TELLING * np.sqrt(np.diag(moments)).mean():
         return None
-    weights: Array = np.linalg.solve(process.gram(), departure).T
+    weights = np.asarray(np.linalg.solve(process.gram(), departure).T, np.float64)
     return {"length": process.length, "noise": process.noise, "weights": rounded(weights)}
