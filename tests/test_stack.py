@@ -157,7 +157,7 @@ def test_an_interrupted_stack_is_continued_to_the_same_bytes(tmp_path, monkeypat
 
     monkeypatch.setattr(Photograph, "bands", stop_in_the_fourth)
     monkeypatch.setattr(ThreadPoolExecutor, "shutdown", hear)
-    monkeypatch.setattr(sys.modules["impasto.stack"], "_decoders", lambda *_: 1)
+    monkeypatch.setattr(sys.modules["impasto.stack"], "_decoders", lambda *_, **__: 1)
     with pytest.raises(KeyboardInterrupt):
         stack(folder, path)
     with pytest.raises(StoreError, match="3 of 6 photographs"):

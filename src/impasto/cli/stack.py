@@ -44,6 +44,10 @@ def stack(
     colour: Annotated[
         Path | None, typer.Option("--colour", metavar="FILE", help="The camera's colours, calibrated.")
     ] = None,
+    steadiness: Annotated[
+        Path | None,
+        typer.Option("--steadiness", metavar="FILE", help="Shift photographs back that moved, as measured."),
+    ] = None,
     half_size: Annotated[
         bool, typer.Option("--half-size", help="Read raw files at half size, which is faster.")
     ] = False,
@@ -64,6 +68,7 @@ def stack(
             flat=flat,
             white=white,
             colour=colour,
+            steadiness=steadiness,
             half_size=half_size,
             overwrite=overwrite,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import threading
 import time
@@ -24,6 +25,7 @@ from impasto.stack.corrections import Corrections, read_corrections
 from impasto.stack.light_colour import light_colour
 from impasto.stack.linearise import Linearisation, linearisations
 from impasto.stack.samples import Samples
+from impasto.stack.shift import Shift
 
 # Noise in relative radiance where the capture does not state it, by the type of the photographs: an 8-bit
 # encoding rounds to half a per cent of the radiance and to 0.001 near black; see docs/store.md.
@@ -94,6 +96,7 @@ def stack(
     flat: str | os.PathLike[str] | None = None,
     white: str | os.PathLike[str] | None = None,
     colour: str | os.PathLike[str] | None = None,
+    steadiness: str | os.PathLike[str] | None = None,
     half_size: bool = False,
     overwrite: bool = False,
     memory_bytes: float = 1.6e9,
@@ -118,8 +121,9 @@ def stack(
     brackets : iterable of path, optional
         Folders with further exposures of the same names, which are merged with those in `photos`; by default
         those that the light file names.
-    oecf, dark, flat, white, colour : path, optional
-        Calibration files, as `impasto.calibrate` makes them.
+    oecf, dark, flat, white, colour, steadiness : path, optional
+        Calibration files, as `impasto.calibrate` makes them. By the last, photographs that moved are shifted
+        back.
     half_size : bool, optional
         Whether raw files are read at half size, which is faster.
     overwrite : bool, optional
@@ -143,7 +147,14 @@ def stack(
     started = time.perf_counter()
     path = Path(store)
     capture = _read(Path(photos), path, lights, exclude, half_size)
-    named = {"oecf": oecf, "dark": dark, "flat": flat, "white": white, "colour": colour}
+    named = {
+        "oecf": oecf,
+        "dark": dark,
+        "flat": flat,
+        "white": white,
+        "colour": colour,
+        "steadiness": steadiness,
+    }
     corrections = read_corrections(named, capture)
     exposures = read_brackets(capture, list(brackets) or capture.brackets)
     job = _Job(capture, corrections, exposures, memory_bytes, show_progress)
@@ -223,6 +234,8 @@ def _room(store: Path, job: _Job) -> list[Problem]:
     raw = float(np.prod(job.header.shape, dtype=np.float64)) * job.header.dtype.itemsize
     there = stores.size_on_disk(store / stores.STACK)
     share = _STORED_SHARE[job.capture.photographs[0].dtype.name]
+    if any("shift_px" in entry for entry in job.header.inputs):
+        share = 1.0  # no decoded 8-bit values any more
     return stores.no_room(store, int(raw * share) - there)
 
 
@@ -259,7 +272,11 @@ class _Job:
         self._linearisations = linearisations(capture.photographs, capture.clip_level, corrections)
         self.header = _header(capture, self._linearisations, corrections, exposures)
         self.decoders = _decoders(
-            capture.photographs, self._linearisations[0], memory_bytes, len(exposures[0])
+            capture.photographs,
+            self._linearisations[0],
+            memory_bytes,
+            len(exposures[0]),
+            shifted="steadiness" in corrections.files,
         )
         self._samples = Samples(self.header.shape, self.header.dtype)
         self._stop = threading.Event()
@@ -365,31 +382,37 @@ class _Job:
 
     def _write_one(self, writer: stores.StackWriter, light: int, advance: Callable[[int], None]) -> bool:
         """Write one photograph; return whether it was there already."""
-        photograph, linearise = self.capture.photographs[light], self._linearisations[light]
+        photograph = self.capture.photographs[light]
         sha256 = self._sha256_of(light)
         if writer.sha256[light] == sha256:
             advance(photograph.height)
             return True
         writer.start_light(light)
+        merged = len(self._exposures[light]) > 1
+        bands = self._merged_bands(light) if merged else self._bands(light)
+        if (shift := self._corrections.shift(photograph.name)) is not None:
+            bands = self._shift(shift).bands((row, stored) for row, stored, _ in bands)
         clipped = 0
-        if len(self._exposures[light]) > 1:
-            clipped = self._write_merged(writer, light, advance)
-        else:
-            for row, band in photograph.bands(stores.STACK_CHUNK):
-                self._check_stop()
-                stored, more = linearise.stored(band, row)
-                clipped += more
-                self._store(writer, light, row, stored)
-                advance(len(band))
+        for row, stored, more in bands:
+            self._check_stop()
+            clipped += more
+            self._samples.take(light, row, stored)
+            writer.write_band(light, row, stored)
+            advance(len(stored))
         writer.finish_light(light, sha256, clipped)
         return False
 
-    def _store(self, writer: stores.StackWriter, light: int, row: int, stored: NDArray[Any]) -> None:
-        self._samples.take(light, row, stored)
-        writer.write_band(light, row, stored)
+    def _shift(self, shift_px: tuple[float, float]) -> Shift:
+        levels = [math.inf if level is None else level for level in self.header.clip_level]
+        return Shift(shift_px, self.header.shape[1], np.array(levels) / self.header.scale)
 
-    def _write_merged(self, writer: stores.StackWriter, light: int, advance: Callable[[int], None]) -> int:
-        """Write the merged exposures of a light; return how many samples are clipped in all of them."""
+    def _bands(self, light: int) -> Iterator[tuple[int, NDArray[Any], int]]:
+        """Yield the first row of each band of a photograph, its stored values, and how many are clipped."""
+        for row, band in self.capture.photographs[light].bands(stores.STACK_CHUNK):
+            yield (row, *self._linearisations[light].stored(band, row))
+
+    def _merged_bands(self, light: int) -> Iterator[tuple[int, NDArray[Any], int]]:
+        """Yield the same of a light's merged exposures: samples count that are clipped in all of them."""
         exposures, linearise = self._exposures[light], self._linearisations[light]
         decoded = []
         for exposure in exposures:
@@ -408,17 +431,12 @@ class _Job:
         self._notes[light] = notes
         read, photon = (self.header.noise[name] * self._read_scale for name in ("read", "photon"))
         beyond = np.float32(max(level for level in self.header.clip_level if level is not None) * 1.01)
-        clipped = 0
         for number, (row, _) in enumerate(decoded[0]):
-            self._check_stop()
             parts = [linearise.radiance(bands[number][1], row) for bands in decoded]
             merged = merge(parts, times, read, photon)
             lost = np.isposinf(merged)
-            clipped += int(np.count_nonzero(lost))
             merged[lost] = beyond / np.float32(self.header.scale)
-            self._store(writer, light, row, merged)
-            advance(len(merged))
-        return clipped
+            yield row, merged, int(np.count_nonzero(lost))
 
     @property
     def _read_scale(self) -> float:
@@ -450,9 +468,12 @@ def _header(
         scale, dtype = 1 / white, np.dtype(np.float32)
         # What the shortest exposure just shows, wherever a flat field lifts it most.
         clip_level = np.full(first.channels, corrections.largest_gain / min(times) / white)
-    notes = [*capture.notes]
-    if sentence := corrections.uncalibrated(capture.photographs):
-        notes.append(sentence)
+    shifts = [corrections.shift(photograph.name) for photograph in capture.photographs]
+    if any(shifts) and dtype.kind == "u":
+        # The largest value stands for samples beyond the border of a photograph that is shifted.
+        clip_level = np.minimum(clip_level, (np.iinfo(np.uint16).max - 0.5) * scale)
+    said = (corrections.uncalibrated(capture.photographs), corrections.movement(capture.photographs))
+    notes = [*capture.notes, *filter(None, said)]
     if (oecf := corrections.content("oecf")) is not None and oecf["linear"]:
         notes.append("the camera is linear, as its calibration found: its response is not changed")
     return stores.StackHeader(
@@ -478,13 +499,14 @@ def _header(
                     for name in ("camera", "lens", "taken")
                     if (value := getattr(photograph, name)) is not None
                 },
+                **({} if shift is None else {"shift_px": list(shift)}),
                 **(
                     {"brackets": [[str(one.photograph.path.name), one.time] for one in merged[1:]]}
                     if len(merged) > 1
                     else {}
                 ),
             }
-            for photograph, merged in zip(capture.photographs, exposures, strict=True)
+            for photograph, merged, shift in zip(capture.photographs, exposures, shifts, strict=True)
         ],
         more={
             "quantisation_step": max(each.step for each in decoding),
@@ -499,7 +521,12 @@ def _header(
 
 
 def _decoders(
-    photographs: Sequence[Photograph], linearisation: Linearisation, memory_bytes: float, exposures: int = 1
+    photographs: Sequence[Photograph],
+    linearisation: Linearisation,
+    memory_bytes: float,
+    exposures: int = 1,
+    *,
+    shifted: bool = False,
 ) -> int:
     """Return how many photographs to decode at a time: as many as there are cores, if memory allows."""
     rows = stores.STACK_CHUNK
@@ -511,6 +538,8 @@ def _decoders(
             (rows + max(rows, photograph.unit_rows)) * photograph.dtype.itemsize
             # the band as stored, its chunks, and the chunks compressed
             + 3 * rows * linearisation.dtype.itemsize
+            # bands that a shift holds, with the one that it makes
+            + 3 * shifted * rows * linearisation.dtype.itemsize
             # exposures to be merged, all of each, and some bands of floats
             + (exposures > 1) * exposures * (photograph.height * photograph.dtype.itemsize + 16 * rows)
         )

@@ -1,4 +1,4 @@
-"""What calibration files do to photographs as they are stacked: response, dark frame and flat field."""
+"""What calibration files do to photographs as they are stacked."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from impasto.errors import CaptureError, Problem, raise_problems
 
 Named = str | PathLike[str] | None
 
-KINDS = ("oecf", "dark", "flat", "white", "colour")
+KINDS = ("oecf", "dark", "flat", "white", "colour", "steadiness")
 _EVERY = "*"
 # What the summary says where a step is left out.
 _LEFT_OUT = {
@@ -79,6 +79,14 @@ class Corrections:
         """Whether samples are changed, and not just described."""
         return bool({"dark", "flat"} & self.files.keys())
 
+    def shift(self, name: str) -> tuple[float, float] | None:
+        """Return the columns and rows by which a photograph is to be shifted back, None if it is not."""
+        content = self.content("steadiness")
+        if content is None or name not in content["corrected"]:
+            return None
+        columns, rows = content["shift_px"][name]
+        return float(columns), float(rows)
+
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of the stack that follow from the calibration."""
         more: dict[str, Any] = {
@@ -109,6 +117,25 @@ class Corrections:
         if white is None:
             return None
         return {"light_rgb": white["light_rgb"], "light_rgb_source": "white reference"}
+
+    def movement(self, photographs: Sequence[Photograph]) -> str:
+        """Return in a sentence what is done about photographs that moved, "" without a measurement."""
+        content = self.content("steadiness")
+        if content is None:
+            return ""
+        shifts = {photograph.name: self.shift(photograph.name) for photograph in photographs}
+        back = {name: float(np.hypot(*shift)) for name, shift in shifts.items() if shift is not None}
+        said = "no photograph has moved: none is shifted"
+        if back:
+            most = max(back, key=lambda name: back[name])
+            said = f"{len(back)} of {len(shifts)} photographs are shifted back, by up to "
+            said += f"{back[most]:.2f} px ({most})"
+        unknown = [name for name in shifts if content["shift_px"][name] is None]
+        turned = [name for name in shifts if name in content["turned_px"]]
+        for names, why in ((unknown, "their shift is not known"), (turned, "they are turned or scaled")):
+            if names:
+                said += f"; left where they are, because {why}: {', '.join(names)}"
+        return said
 
     def uncalibrated(self, photographs: Sequence[Photograph]) -> str:
         """Return in a sentence what is not calibrated, "" if everything is."""
@@ -149,6 +176,16 @@ def read_corrections(named: dict[str, Named], capture: Capture) -> Corrections:
     corrections = Corrections(files)
     if (flat := corrections.content("flat")) is not None:
         problems += _flat_problems(files["flat"], flat, capture)
+    if (steadiness := corrections.content("steadiness")) is not None:
+        problems += [
+            Problem(
+                files["steadiness"].path.name,
+                f"holds no shift of {photograph.name}",
+                "Measure the shifts of the whole series",
+            )
+            for photograph in capture.photographs
+            if photograph.name not in steadiness["shift_px"]
+        ]
     if (oecf := corrections.content("oecf")) is not None:
         dtype = capture.photographs[0].dtype.name
         if dtype != oecf["dtype"]:

@@ -141,13 +141,26 @@ def display_lines(found: DisplayCalibration) -> Iterator[str]:
 def steadiness_lines(found: Steadiness) -> Iterator[str]:
     """Yield by how much the photographs are shifted, and which ones moved."""
     off = np.hypot(*found.shift_px.T)
-    yield f"{count(len(found.names), 'photograph')}: shifted by {np.median(off):.2f} px in the median"
-    yield f"largest shift: {off.max():.2f} px, {found.names[int(off.argmax())]}"
+    if np.isfinite(off).any():
+        yield (
+            f"{count(len(found.names), 'photograph')}: shifted by {np.nanmedian(off):.2f} px in the median, "
+            f"known within about {np.nanmedian(found.uncertainty_px):.2f} px"
+        )
+        yield f"largest shift: {np.nanmax(off):.2f} px, {found.names[int(np.nanargmax(off))]}"
     if found.bumped:
         yield f"note: the camera was bumped before {found.bumped}: all from there on lie elsewhere"
     elif found.moved:
         yield f"note: shifted by more than half a pixel: {', '.join(found.moved)}"
+    if found.turned:
+        named = ", ".join(f"{name} ({moved:.1f} px in the corners)" for name, moved in found.turned.items())
+        yield f"note: turned or scaled, which is not corrected: {named}"
+    if found.unknown:
+        named = ", ".join(found.unknown)
+        yield f"note: shift not known, too little in common with the others or too far off: {named}"
     yield f"{found.file} is ready"
+    if found.corrected:
+        back = count(len(found.corrected), "photograph")
+        yield f"to shift {back} back: impasto stack PHOTOS STORE --steadiness {found.file}"
 
 
 def glare_lines(found: Glare) -> Iterator[str]:

@@ -66,6 +66,8 @@ def _facts(subject: Subject) -> Iterator[tuple[str, str]]:
         yield "taken", taken[0] if taken[0] == taken[-1] else f"{taken[0]} to {taken[-1]}"
     samples = lights * height * width * channels
     yield "clipped samples", percent(stack.clipped_samples / samples)
+    if back := [float(np.hypot(*entry["shift_px"])) for entry in inputs if entry.get("shift_px")]:
+        yield "shifted back", f"{len(back)} of the photographs, by up to {max(back):.2f} px"
     camera = stack.camera
     tilt = np.degrees(np.arccos(np.clip(camera.view_direction[2], -1.0, 1.0)))
     where = f"{tilt:.1f}° from the normal"
