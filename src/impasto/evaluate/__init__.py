@@ -19,6 +19,7 @@ from impasto.evaluate.baselines import BaselineErrors, baseline_errors
 from impasto.evaluate.errors import ErrorAccumulator, ImageErrors, mean_errors
 from impasto.evaluate.held_out import fold_lights, listed_lights, named_lights, spread_lights
 from impasto.evaluate.results import LightErrors, ModelErrors, join_baselines, join_models
+from impasto.evaluate.shares import ErrorShares, Photographed, error_shares
 from impasto.fit import FitOptions, fit
 from impasto.geometry import Lights, zenith_azimuth
 from impasto.models import ModelSpec, parse_model
@@ -35,7 +36,15 @@ from impasto.store import (
 )
 from impasto.store.borrow import borrowed_stack
 
-__all__ = ["BaselineErrors", "EvaluateSummary", "ImageErrors", "LightErrors", "ModelErrors", "evaluate"]
+__all__ = [
+    "BaselineErrors",
+    "ErrorShares",
+    "EvaluateSummary",
+    "ImageErrors",
+    "LightErrors",
+    "ModelErrors",
+    "evaluate",
+]
 
 _DEFAULT_MODELS = ("torrance-sparrow", "phong")
 _DEFAULT_HELD_OUT = 5
@@ -210,6 +219,8 @@ def _judge(
                 lights=errors,
                 mean=mean_errors([entry.errors for entry in errors]),
                 without_residual=alone,
+                # Of several rounds no one fit stands for the result.
+                shares=_shares(fitted, stack, spec, options) if record else None,
             )
             results.append(result)
             if not record:
@@ -221,6 +232,15 @@ def _judge(
     seen = [number for number in range(len(stack.lights)) if number not in held]
     without_model = baseline_errors(stack, seen, held, show_progress) if baselines else ()
     return _Judged(tuple(results), without_model, not_recorded)
+
+
+def _shares(fitted: Fit, stack: Stack, spec: ModelSpec, options: FitOptions) -> ErrorShares | None:
+    """Return whose the error of a fit is on the photographs it has seen; None by the paper's procedure."""
+    if fitted.attributes["procedure"] != "joint":
+        return None
+    left_out = fitted.attributes["options"]["exclude"]
+    seen = [number for number, name in enumerate(stack.lights.names) if name not in left_out]
+    return error_shares(spec, Photographed.of(fitted, stack, seen), options)
 
 
 def _held_out(

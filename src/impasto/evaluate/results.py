@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from impasto.evaluate.baselines import BaselineErrors
 from impasto.evaluate.errors import ImageErrors, mean_errors
+from impasto.evaluate.shares import ErrorShares
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,8 @@ class ModelErrors:
         The mean over them.
     without_residual : ImageErrors or None
         The mean of the model alone, where the fit describes what it leaves over too.
+    shares : ErrorShares or None
+        Whose the error on the fitted photographs is; None by the paper's procedure and over several rounds.
     """
 
     model: str
@@ -56,6 +59,7 @@ class ModelErrors:
     lights: tuple[LightErrors, ...]
     mean: ImageErrors
     without_residual: ImageErrors | None = None
+    shares: ErrorShares | None = None
 
 
 def join_models(found: Sequence[ModelErrors]) -> ModelErrors:

@@ -51,6 +51,7 @@ def fit_tile(
     options: FitOptions | None = None,
     paper: Sample | None = None,
     normal: ArrayLike | None = None,
+    left_out: NDArray[np.bool_] | None = None,
 ) -> stores.Maps:
     """Fit a model to pixels: by the joint procedure, or by the paper's for a sample.
 
@@ -77,6 +78,8 @@ def fit_tile(
     normal : array_like of shape (3,) or (N, 3), optional
         Unit normal of all pixels or of each, for a surface that is known: it is held by the joint procedure,
         which then assumes nothing of the material either.
+    left_out : ndarray of shape (L, N), bool, optional
+        Samples to be left out besides those that are clipped or missing.
 
     Returns
     -------
@@ -102,7 +105,7 @@ def fit_tile(
         light_rgb=np.asarray(light_rgb, np.float64),
         clip_level=np.asarray(clip_level, np.float64),
         shadow_level=-np.inf if options.shadow_level is None else options.shadow_level,
-        sample_mask=None,
+        sample_mask=None if left_out is None else np.ascontiguousarray(left_out, np.uint8),
         noise=noise,
         index=options.index,
         fresnel=options.fresnel,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from impasto.summaries.words import Row
+from impasto.summaries.words import Row, percent
 
 if TYPE_CHECKING:
     from impasto.evaluate import EvaluateSummary, ImageErrors
@@ -30,6 +30,16 @@ def evaluate_tables(summary: EvaluateSummary) -> Iterator[tuple[str, Row, list[R
             rows.append(("mean, model alone", "", *_errors(model.without_residual)))
         how = "fitted again without them" if model.refitted else "the fit in the store has not seen them"
         yield f"{model.model} ({model.procedure}; {how})", header, rows
+    shared = [(model.model, model.shares) for model in summary.models if model.shares is not None]
+    if shared:
+        yield (
+            "Whose the squared error on the fitted photographs is",
+            ("model", "the model's", "the lights'", "shadows'", "noise's"),
+            [
+                (name, *(percent(share) for share in (found.model, found.lights, found.shadows, found.noise)))
+                for name, found in shared
+            ],
+        )
     if summary.baselines:
         yield (
             "Methods without a model, fitted to the same photographs (mean)",

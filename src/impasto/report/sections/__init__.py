@@ -21,6 +21,7 @@ SECTIONS = (
     "comparison",
     "per_light",
     "held_out",
+    "shares",
     "gloss",
     "provenance",
     "citation",

@@ -21,7 +21,7 @@ def section(subject: Subject) -> Section:
     """Return the errors that `evaluate` kept, with signed difference images, or how to get them."""
     page = Section("Photographs kept out of the fit")
     found = {model: read_evaluation(subject.store, model) for model in subject.models}
-    current = {model: each for model, each in found.items() if each and _is_current(each, subject, model)}
+    current = {model: each for model, each in found.items() if each and is_current(each, subject, model)}
     old = [model for model, each in found.items() if each and model not in current]
     if old:
         page.notes(
@@ -50,7 +50,7 @@ def section(subject: Subject) -> Section:
     return page
 
 
-def _is_current(evaluation: Evaluation, subject: Subject, model: str) -> bool:
+def is_current(evaluation: Evaluation, subject: Subject, model: str) -> bool:
     """Return whether an evaluation is about the stack and the fit that are in the store now."""
     same_stack = evaluation.attributes["stack_sha256"] == subject.stack.sha256
     return same_stack and _settings(evaluation) == _settings(subject.fits[model])
