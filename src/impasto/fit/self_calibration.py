@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from impasto import store as stores
 from impasto.arm import find_arm
 from impasto.fit.light_directions import MIN_LIGHTS, correct_directions
+from impasto.fit.strength import TELLING
 from impasto.geometry import Array, Lights
 
 WORTH_DB = 0.1
@@ -55,8 +56,9 @@ class Calibration:
     gain : ndarray of shape (L, C)
         Strength found over strength stated, of median 1.
     trend : ndarray of shape (L, C)
-        The part of it that changes smoothly with direction, and is left in the photographs: a painting that
-        is brighter under all lights from one side cannot be told from lights that are stronger there.
+        The part of it that is a quadratic function of direction, where there is one, and is left in the
+        photographs: a painting that is brighter under all lights from one side cannot be told from lights
+        that are stronger there.
     directions : dict
         Whether corrected directions are used, and why; empty where none were sought.
     """
@@ -135,7 +137,7 @@ def find_strengths(pixels: PixelFit, lights: Lights) -> Calibration:
         matte = pixels.radiance(maps, used, highlights=False)
         log_gain = log_gain - trend + _log_strength(measured, radiance, matte, clipped, floor)
         log_gain -= np.median(log_gain)
-        trend = np.stack([_trend(lights.direction, column) for column in log_gain.T], axis=1)
+        trend = _trend(lights.direction, log_gain)
         used = replace(used, intensity=stated * np.exp(log_gain - trend))
     return Calibration(used, np.exp(log_gain), np.exp(trend))
 
@@ -165,19 +167,33 @@ def _weighted_median(values: Values, weights: Values) -> float:
 
 
 def _trend(direction: Array, log_gain: Array) -> Array:
-    """Return the quadratic function of direction that robustly describes values (L,), at the lights."""
+    """Return the quadratic function of direction that describes values (L, C), at the lights.
+
+    It is each channel's median where lights, left out, are not told by that function: of strengths that have
+    nothing to do with direction, the trend is chance.
+    """
     x, y, z = direction.T
     terms = np.stack([np.ones_like(x), x, y, z, x * x, y * y, x * y], axis=1)
+    level = np.broadcast_to(np.median(log_gain, axis=0), log_gain.shape)
     if len(direction) < 3 * terms.shape[1]:
-        return np.full_like(log_gain, np.median(log_gain))
+        return level
+    fitted, left_out = zip(*(_robust_fit(terms, column) for column in log_gain.T), strict=True)
+    if np.abs(left_out).mean() > TELLING * np.abs(log_gain - level).mean():
+        return level
+    return np.stack(fitted, axis=1)
+
+
+def _robust_fit(terms: Array, log_gain: Array) -> tuple[Array, Array]:
+    """Return the combination of terms (L, T) that robustly describes values (L,), and its left-out errors."""
     ridge = 0.1 * np.eye(terms.shape[1])
     ridge[0, 0] = 0.0
     weight = np.ones_like(log_gain)
-    fitted = log_gain
+    hat = np.eye(len(log_gain))
     for _ in range(20):
         weighted = terms * weight[:, None]
-        fitted = terms @ np.linalg.solve(terms.T @ weighted + ridge, weighted.T @ log_gain)
-        rest = log_gain - fitted
+        hat = terms @ np.linalg.solve(terms.T @ weighted + ridge, weighted.T)
+        rest = log_gain - hat @ log_gain
         scale = 2.0 * 1.4826 * np.median(np.abs(rest)) + 1e-9
         weight = 1.0 / (1.0 + np.square(rest / scale))
-    return fitted
+    fitted = hat @ log_gain
+    return fitted, (log_gain - fitted) / (1.0 - np.diag(hat))

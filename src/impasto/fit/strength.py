@@ -9,9 +9,9 @@ import numpy as np
 from impasto.fit.light_process import rounded, usual_processes
 from impasto.geometry import Array
 
-# The neighbours of a light tell its strength where they lower the error to this share of it; of strengths
-# that have nothing to do with direction, chance lowers it by a few per cent.
-_TELLING = 0.85
+TELLING = 0.85
+"""Other lights tell the strength of a light where they lower the error to this share of it; of strengths that
+have nothing to do with direction, chance lowers it by a few per cent."""
 
 
 def find_strength(direction: Array, departure: Array) -> dict[str, Any] | None:
@@ -38,7 +38,7 @@ def find_strength(direction: Array, departure: Array) -> dict[str, Any] | None:
     processes = usual_processes(direction)
     errors = [np.sqrt(process.left_out(moments)).mean() for process in processes]
     process = processes[int(np.argmin(errors))]
-    if not min(errors) < _TELLING * np.sqrt(np.diag(moments)).mean():
+    if not min(errors) < TELLING * np.sqrt(np.diag(moments)).mean():
         return None
     weights = np.asarray(np.linalg.solve(process.gram(), departure).T, np.float64)
     return {"length": process.length, "noise": process.noise, "weights": rounded(weights)}
