@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from impasto.calibrate.lights import lights
     from impasto.calibrate.oecf import oecf
     from impasto.calibrate.steadiness import steadiness
+    from impasto.calibrate.target import target
     from impasto.calibrate.white import white
 
-__all__ = ["colour", "dark", "display", "flat", "glare", "lights", "oecf", "steadiness", "white"]
+__all__ = ["colour", "dark", "display", "flat", "glare", "lights", "oecf", "steadiness", "target", "white"]
 
 make_lazy(__name__, {name: name for name in __all__})

@@ -146,6 +146,7 @@ def colour(
         "chosen": chosen,
         "white_xyz": white_xyz.tolist(),
         "patches": list(table.names),
+        "boxes_px": [list(box) for box in table.boxes],
         "methods": {
             name: {
                 "matrix": fit.matrix.tolist(),

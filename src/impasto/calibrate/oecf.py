@@ -166,6 +166,8 @@ def oecf(
         "nonlinearity": nonlinearity,
         "residual": found.residual,
         "noise": noise,
+        "patches": list(target.names),
+        "boxes_px": [list(box) for box in target.boxes],
     }
     made_from = [*(shot.provenance for shot in used), target.source]
     write_calibration(file, "oecf", content, subject=subject_of(shots, iso=True), made_from=made_from)

@@ -21,6 +21,7 @@ from impasto.summaries.calibrate import (
     lights_table,
     oecf_lines,
     steadiness_lines,
+    target_lines,
     white_lines,
 )
 
@@ -216,6 +217,24 @@ def white(
             oecf=oecf,
         )
         report.say_all(white_lines(found))
+        report.done(found)
+
+
+@commands.command(epilog="Example: impasto calibrate target chart.tif chart.csv")
+def target(
+    photo: Annotated[Path, typer.Argument(metavar="PHOTO", help="Photograph of a colour target.")],
+    out: Annotated[Path, typer.Argument(metavar="CSV", help="Table of its patches to write.")],
+    grey: Annotated[
+        bool, typer.Option("--grey", help="Only the neutral patches, for `calibrate oecf`.")
+    ] = False,
+    oecf: OecfFile = None,
+    json: Json = None,
+    debug: Debug = False,
+) -> None:
+    """Find the classic colour target of 24 patches in a photograph."""
+    with reporting("calibrate target", json, debug) as report:
+        found = calibrate.target(photo, out, grey=grey, oecf=oecf)
+        report.say_all(target_lines(found))
         report.done(found)
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from impasto.calibrate.lights import LightsCalibration
     from impasto.calibrate.oecf import Oecf
     from impasto.calibrate.steadiness import Steadiness
+    from impasto.calibrate.target import Target
     from impasto.calibrate.white import White
 
 
@@ -126,6 +127,17 @@ def colour_lines(found: Colour) -> Iterator[str]:
     worst = int(np.argmax(fit.difference))
     yield f"taken: {found.chosen}; worst patch {found.names[worst]}, {fit.difference[worst]:.2f}"
     yield f"{found.file} is ready; next: impasto stack PHOTOS STORE --colour {found.file}"
+
+
+def target_lines(found: Target) -> Iterator[str]:
+    """Yield what was found of a colour target, where to check it, and what takes the table."""
+    yield (
+        f"{found.name}: outlines of {found.seen} of 24 patches seen; colours within "
+        f"{found.difference:.1f} CIELAB in the mean, after the best matrix"
+    )
+    yield f"check the outlines in {found.picture}; correct boxes in {found.file} if they are off"
+    step = "colour" if len(found.patches) == 24 else "oecf"
+    yield f"{found.file} is ready; next: impasto calibrate {step} PHOTO {found.file} {step}.json --card PHOTO"
 
 
 def display_lines(found: DisplayCalibration) -> Iterator[str]:

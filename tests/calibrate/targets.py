@@ -1,0 +1,82 @@
+"""Photographs of the simulator's colour chart, turned, tilted and spoilt, with the truth."""
+
+import numpy as np
+from scipy import ndimage
+
+from impasto.calibrate.lattice import fit_homography, project
+from impasto.capture.simulate.charts import colour_chart
+
+CHART = (400, 600)
+
+
+def photograph(
+    *,
+    turns=0,
+    angle_deg=0.0,
+    perspective=0.0,
+    mirrored=False,
+    covered=None,
+    haze=0.0,
+    size=(480, 640),
+    noise=0.003,
+    gain=(0.7, 1.0, 0.5),
+    around=0.2,
+    seed=0,
+):
+    """Return linear radiance (H, W, 3), and where the middles of the 24 patches lie, column first.
+
+    `turns` are quarter turns against the clock, `perspective` is by how much the lower edge is longer,
+    `covered` are rows and columns of the chart under a grey card, `haze` is the share of light that is
+    veiling glare. The light falls off by 20 % across the frame.
+    """
+    chart = colour_chart().image(CHART)
+    if covered is not None:
+        chart[covered] = 0.5
+    boxes = np.array(colour_chart().boxes(CHART), float)
+    middles = np.column_stack([boxes[:, 1] + boxes[:, 3], boxes[:, 0] + boxes[:, 2]]) / 2
+    height, width = CHART
+    if mirrored:
+        chart = chart[:, ::-1]
+        middles[:, 0] = width - middles[:, 0]
+    scale = 0.55 * min(size) / min(CHART) if turns % 2 == 0 else 0.55 * min(size) / max(CHART) * 1.3
+    corners = scale / 2 * np.array([[-width, -height], [width, -height], [width, height], [-width, height]])
+    angle = np.radians(angle_deg - 90 * turns)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    corners = corners @ turn
+    corners[:, 0] *= 1 + perspective * corners[:, 1] / np.ptp(corners[:, 1])
+    corners += [size[1] / 2 + 9, size[0] / 2 - 7]
+    flat = np.array([[0, 0], [width, 0], [width, height], [0, height]], float)
+    rows, columns = np.indices(size)
+    place = project(fit_homography(corners, flat), np.stack([columns, rows], axis=-1).astype(float) + 0.5)
+    where = [place[..., 1] - 0.5, place[..., 0] - 0.5]
+    image = np.stack(
+        [ndimage.map_coordinates(chart[..., c], where, order=1, cval=around) for c in range(3)], axis=-1
+    )
+    image = ndimage.gaussian_filter(image, (0.7, 0.7, 0))
+    image = (1 - haze) * image + haze * 0.2
+    image = image * gain * (1 + 0.2 * columns / size[1])[..., None]
+    image = image + np.random.default_rng(seed).normal(0, noise, image.shape) * np.sqrt(image)
+    return np.maximum(image, 0), project(fit_homography(flat, corners), middles) - 0.5
+
+
+def painting(size=(480, 640), seed=3):
+    """Return radiance of a painting of a regular grid of coloured rectangles, as many abstract ones are."""
+    rng = np.random.default_rng(seed)
+    image = np.full((*size, 3), 0.05)
+    step = 70
+    for row in range(15, size[0] - step, step):
+        for column in range(15, size[1] - step, step):
+            image[row : row + 56, column : column + 56] = rng.uniform(0.03, 0.9, 3)
+    image = ndimage.gaussian_filter(image, (0.7, 0.7, 0))
+    return image + rng.normal(0, 0.003, image.shape) * np.sqrt(image)
+
+
+def scattered(size=(480, 640), seed=4):
+    """Return radiance of rectangles of all sizes and places."""
+    rng = np.random.default_rng(seed)
+    image = np.full((*size, 3), 0.2)
+    for _ in range(60):
+        row, column = rng.integers(0, size[0] - 20), rng.integers(0, size[1] - 20)
+        height, width = rng.integers(15, 120, 2)
+        image[row : row + height, column : column + width] = rng.uniform(0.03, 0.9, 3)
+    return ndimage.gaussian_filter(image, (0.7, 0.7, 0))
