@@ -3,19 +3,30 @@
 import shutil
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
+import zarr
 
 import impasto
 from impasto.errors import OptionError
 from impasto.fit import FitOptions
 from impasto.fit.light_process import LightProcess, compress, hull_of
+from impasto.fit.remainder import product
 from impasto.fit.strength import find_strength
-from impasto.geometry import arm_direction, dome_direction
+from impasto.geometry import Lights, arm_direction, dome_direction
 from impasto.residual import ZERO, ResidualTerm, decode, encode, kernel
 from impasto.store import open_fit, open_stack
 
 RNG = np.random.default_rng(4)
 MODEL = "torrance-sparrow"
+
+
+@pytest.mark.parametrize("shape", [(5000, 200, 18), (7, 3, 2), (3, 2000, 200), (0, 4, 2)])
+def test_a_product_in_pieces_is_the_product(shape):
+    pixels, count, components = shape
+    samples = RNG.normal(size=(pixels, count)).astype(np.float32)
+    table = RNG.normal(size=(components, count)).astype(np.float32).T
+    np.testing.assert_allclose(product(samples, table), samples @ table, rtol=1e-4, atol=1e-3)
 
 
 def lights(count=24, zenith_deg=70):
@@ -141,6 +152,22 @@ def test_strengths_that_have_nothing_to_do_with_direction_are_not_told():
     assert sum(told is not None for told in draws) <= 2
 
 
+def test_even_lights_are_as_bright_as_stated():
+    direction = lights(30)
+    strength = {"length": 0.4, "weights": RNG.normal(0.0, 0.1, (3, 30)).tolist()}
+    term = ResidualTerm.of({"residual": {**plain_term(direction), "strength": strength}})
+    stated = Lights(("a", "b"), direction[:2], intensity=np.array([[1.0], [2.0]]))
+    model = np.array([0.3, 0.6], np.float32)[:, None, None] * np.ones((2, 4, 3), np.float32)
+    codes = np.full((4, 1), ZERO, np.uint16)
+    followed, even = model.copy(), model.copy()
+    term.add(followed, codes, stated.direction, stated.irradiance())
+    assert np.abs(followed / model - 1.0).max() > 0.05
+    found = term.even(stated)
+    even *= (found.intensity / stated.intensity)[:, None].astype(np.float32)
+    term.add(even, codes, found.direction, found.irradiance())
+    np.testing.assert_allclose(even, model, rtol=1e-4)
+
+
 def plain_term(direction):
     """Return the attribute of a term that adds nothing."""
     return {
@@ -184,6 +211,24 @@ def test_a_fit_with_it_renders_closer_and_keeps_the_maps(painting, tmp_path):
     assert errors[1] < 0.8 * errors[0]
 
 
+def test_renderings_of_even_light_do_not_follow_the_strengths(painting, tmp_path):
+    store = fitted(painting, tmp_path, residual=True, residual_components=2, self_calibrate=False)
+    group = zarr.open_group(store / "fits" / MODEL, mode="r+")
+    found = dict(group.attrs["residual"])
+    channels, count = len(found["weights"][0]), len(found["direction"])
+    found["strength"] = {"length": 0.4, "weights": np.full((channels, count), 0.05).tolist()}
+    group.attrs["residual"] = found
+    light = (20.0, 60.0)
+    images = []
+    for even in (False, True):
+        out = tmp_path / str(even)
+        impasto.render(store, model=MODEL, light=[light], out=out, raw=True, even_light=even)
+        images.append(oiio.ImageInput.open(str(out / "1.exr")).read_image("float"))
+    strength = ResidualTerm.of({"residual": found}).strength(dome_direction(*np.radians([light]).T))
+    assert strength.min() > 1.05
+    np.testing.assert_allclose(images[0], images[1] * strength[0], rtol=1e-3, atol=1e-5)
+
+
 def test_the_papers_procedure_has_none(painting):
     with pytest.raises(OptionError, match="residual"):
         impasto.fit(painting, models=[MODEL], procedure="paper", options=FitOptions(residual=True))
@@ -203,7 +248,6 @@ def test_strengths_are_found_that_were_not_stated(painting, tmp_path):
     before = np.array(open_fit(store, MODEL).attributes["self_calibration"]["gain"])
     stack = open_stack(store)
     assert json.loads((document / "zarr.json").read_text())["shape"][0] == len(stack.lights)
-    import zarr
 
     array = zarr.open_array(document, mode="r+")
     stated = array[...]

@@ -8,13 +8,13 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from impasto.geometry import Array
+from impasto.geometry import Array, Lights
 
 Values = NDArray[np.float32]
 
@@ -147,6 +147,10 @@ class ResidualTerm:
         told = kernel(direction, self.direction, self.strength_length) @ self.strength_weights.T
         result: Array = np.exp(told * self.share(direction)[:, None])
         return result
+
+    def even(self, lights: Lights) -> Lights:
+        """Return lights under which renderings are as bright as under `lights` of the strength stated."""
+        return replace(lights, intensity=lights.intensity / self.strength(lights.direction))
 
     def coefficients(self, codes: NDArray[np.unsignedinteger]) -> Values:
         """Return the coefficients of codes (..., K), as multiples of `step`."""

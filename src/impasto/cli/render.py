@@ -33,6 +33,10 @@ def render(
             help="Light on the arm, degrees, or a sweep START:STOP:STEP; may be repeated.",
         ),
     ] = None,
+    even_light: Annotated[
+        bool,
+        typer.Option("--even-light", help="Do not follow the strength of the lights photographed."),
+    ] = False,
     display: Annotated[
         str, typer.Option("--display", metavar="NAME|FILE", help="srgb, display-p3 or an ICC profile.")
     ] = "srgb",
@@ -75,6 +79,7 @@ def render(
             lights=lights,
             light=[parse_light(text) for text in light or ()],
             arm=parse_angles(arm or ()),
+            even_light=even_light,
             out=out,
             display=display,
             exposure=exposure,

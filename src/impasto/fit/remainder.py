@@ -22,6 +22,9 @@ _HEADROOM = 4.0
 
 _BLOCK = 4096
 
+# Products of up to so many multiplications OpenBLAS computes on the thread that asks for them.
+_ON_ONE_THREAD = 2**18
+
 
 def left_over(
     measured: Values, radiance: Values, clipped: NDArray[np.bool_], irradiance: Values, toe: float
@@ -70,9 +73,28 @@ class Remainder:
     def codes(self, rest: Values) -> NDArray[np.uint16]:
         """Return the codes (N, K) of what is left over, (L, N, C)."""
         samples = rest.transpose(1, 0, 2).reshape(rest.shape[1], -1)
-        codes = np.clip(np.rint(samples @ self.encoder.T), -ZERO, ZERO - 1)
+        codes = np.clip(np.rint(product(samples, self.encoder.T)), -ZERO, ZERO - 1)
         result: NDArray[np.uint16] = (codes + ZERO).astype(np.uint16)
         return result
+
+
+def product(samples: Values, table: Values) -> Values:
+    """Return samples (P, N) @ table (N, K), on the calling thread alone.
+
+    For callers that keep all processors busy themselves: the threads that a BLAS would add for each product
+    take a third of the whole processor time, most of it waiting for each other.
+    """
+    pixels, count = samples.shape
+    rows = max(1, _ON_ONE_THREAD // max(1, count * table.shape[1]))
+    whole = pixels // rows * rows
+    result = np.empty((pixels, table.shape[1]), np.float32)
+    np.matmul(
+        samples[:whole].reshape(-1, rows, count),
+        table,
+        out=result[:whole].reshape(-1, rows, table.shape[1]),
+    )
+    np.matmul(samples[whole:], table, out=result[whole:])
+    return result
 
 
 def usual_toe(measured: Values) -> float:

@@ -26,6 +26,7 @@ from impasto.progress import progress
 from impasto.render.animation import Animation
 from impasto.render.display import requested_rendition
 from impasto.render.lights import requested_lights
+from impasto.residual import ResidualTerm
 from impasto.store import Fit, PublishedStack, Stack, is_published, open_fit, open_published, open_stack
 
 _BAND_BYTES = 192e6
@@ -105,6 +106,7 @@ def render(
     lights: str | PathLike[str] | Lights | None = None,
     light: Sequence[tuple[float, float]] = (),
     arm: Sequence[float] = (),
+    even_light: bool = False,
     out: str | PathLike[str],
     display: str | PathLike[str] | Display = "srgb",
     exposure: float = 1.0,
@@ -133,6 +135,9 @@ def render(
         Zenith and azimuth of single lights, degrees.
     arm : sequence of float, optional
         Arm angles, degrees.
+    even_light : bool, optional
+        Whether lights are as strong as stated, where the fit tells how strong those around them were; else
+        they are so strong.
     out : path
         Folder for the pictures, made if it is not there; pictures of the same names are replaced.
     display : str, path or Display, optional
@@ -179,6 +184,9 @@ def render(
         wanted = lights
     else:
         wanted = requested_lights(lights, light, arm, channels, stack.camera)
+    term = ResidualTerm.of(fit.attributes)
+    if even_light and term is not None:
+        wanted = term.even(wanted)
     rendition = requested_rendition(
         stack,
         display=display,
