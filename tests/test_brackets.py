@@ -94,7 +94,8 @@ def test_a_wrong_exposure_time_is_found(bracketed, tmp_path):
 def test_missing_exposures_are_listed(bracketed, tmp_path):
     short = tmp_path / "short"
     short.mkdir()
-    (short / "light-000.tif").write_bytes((bracketed / "light-000.tif").read_bytes())
+    image = tifffile.imread(bracketed / "light-000.tif")
+    tifffile.imwrite(short / "light-000.tif", image, photometric="rgb")
     with pytest.raises(CaptureError) as error:
         impasto.stack(bracketed, tmp_path / "p.zarr", brackets=[short])
     assert "holds no exposure of light-001" in str(error.value)

@@ -83,6 +83,8 @@ def write_tiff(
     image: NDArray[Any],
     icc_profile: ProfileName | bytes | None = None,
     compression: Compression = "deflate",
+    *,
+    exposure_s: float | None = None,
 ) -> None:
     """Write a TIFF file of 8 or 16 bits or of 32-bit floats.
 
@@ -94,6 +96,8 @@ def write_tiff(
         Profile to embed, by name or as it is; None for data that are not colours.
     compression : {'deflate', 'lzw', 'zstd', 'none'}, optional
         How the samples are packed, without loss; the first two with a predictor, zstd for speed without.
+    exposure_s : float, optional
+        Exposure time to note, as TIFF/EP does.
 
     Raises
     ------
@@ -115,7 +119,13 @@ def write_tiff(
             iccprofile=_profile_bytes(icc_profile, grey),
             metadata=None,
             software="impasto",
+            extratags=None if exposure_s is None else [exposure_tag(exposure_s)],
         )
+
+
+def exposure_tag(exposure_s: float) -> tuple[int, str, int, tuple[int, int], bool]:
+    """Return the tag ExposureTime of a TIFF file, as tifffile takes it."""
+    return (33434, "2I", 1, (round(exposure_s * 1_000_000), 1_000_000), True)
 
 
 def write_jpeg(path: str | os.PathLike[str], image: NDArray[np.uint8]) -> None:

@@ -112,7 +112,8 @@ def test_all_that_is_wrong_is_listed(folder, tmp_path):
     cells = table[3].split(",")
     cells[4] = "99999"
     (tmp_path / "wrong.csv").write_text("\n".join([*table[:3], ",".join(cells), *table[4:]]))
-    photo = folder / "tone" / "grey_scale.tif"
+    photo = tmp_path / "untagged.tif"
+    tifffile.imwrite(photo, tifffile.imread(folder / "tone" / "grey_scale.tif"), photometric="rgb")
     with pytest.raises(CaptureError) as error:
         impasto.calibrate.oecf([photo, photo], tmp_path / "wrong.csv", tmp_path / "o.json")
     assert "patch grey 3: has a box that is not inside" in str(error.value)

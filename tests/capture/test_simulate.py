@@ -182,10 +182,10 @@ def test_an_interrupted_run_is_taken_up_to_the_same_end(tmp_path, monkeypatch):
     options = SMALL | {"calibration": True, "brackets": 1, "size": (20, 16)}
     simulate(tmp_path / "whole", **options)
 
-    def stop(path, image, compression):
+    def stop(path, image, compression, **noted):
         if path.name == "light-002.tif":
             raise KeyboardInterrupt
-        write_image(path, image, compression)
+        write_image(path, image, compression, **noted)
 
     with monkeypatch.context() as patch:
         patch.setattr("impasto.capture.simulate.capture.write_image", stop)

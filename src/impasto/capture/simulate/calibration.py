@@ -1,4 +1,4 @@
-"""Calibration shots of the simulated camera: dark frame, white card, charts and mirror spheres."""
+"""Calibration shots of the simulated camera: dark frame, white card, charts, black trap, mirror spheres."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from impasto.capture.simulate import charts, spheres
-from impasto.capture.simulate.camera import Sensor
+from impasto.capture.simulate import charts, glare, spheres
+from impasto.capture.simulate.camera import EXPOSURE_S, Sensor
 from impasto.capture.simulate.files import write_image
 from impasto.capture.simulate.illumination import light_at
 from impasto.geometry import Array, Camera, Lights, pixel_position_mm
@@ -63,6 +63,7 @@ def write_calibration(folder: Path, studio: Studio) -> None:
     tables: dict[str, Callable[[], str]] = {
         "grey_scale.csv": lambda: charts.grey_scale().table(studio.size),
         "colour_chart.csv": lambda: charts.colour_chart().table(studio.size),
+        "glare.csv": lambda: glare.table(studio.size),
         "spheres/spheres.csv": lambda: spheres.table(studio.camera),
     }
     for name, table in tables.items():
@@ -72,7 +73,8 @@ def write_calibration(folder: Path, studio: Studio) -> None:
         path = folder / (name + studio.ending)
         if not path.exists():
             rng = np.random.default_rng((studio.seed, 3, shot))
-            write_image(path, studio.sensor.expose(radiance(), rng, ev), studio.compression)
+            image = studio.sensor.expose(radiance(), rng, ev)
+            write_image(path, image, studio.compression, exposure_s=EXPOSURE_S * 2.0**ev)
 
 
 def _shots(studio: Studio) -> Iterator[tuple[str, Callable[[], Array], float]]:
@@ -93,6 +95,7 @@ def _shots(studio: Studio) -> Iterator[tuple[str, Callable[[], Array], float]]:
         yield f"spheres/{name}", partial(spheres.radiance, studio.camera, studio.lights, light), 0
         if studio.lights.near:
             yield f"flat/{name}", partial(card_radiance, studio, light), 0
+    yield "glare", lambda: glare.seen(glare.trap(size) * card_radiance(studio, frontal)), full
 
 
 def card_radiance(studio: Studio, light: int) -> Array:

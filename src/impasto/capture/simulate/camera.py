@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 Map = NDArray[np.float32]
 
+EXPOSURE_S = 0.1
+"""Exposure time that the files state of the full exposure; only ratios of exposure times have a meaning."""
+
 # Exponents of the ``tone`` response, one per channel: a film-like curve that no standard formula decodes.
 _TONE_POWER = (0.80, 0.84, 0.90)
 _TONE_KNEE = 0.55

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from impasto.capture.simulate import lamps
 from impasto.capture.simulate.calibration import Studio, write_calibration
-from impasto.capture.simulate.camera import Sensor
+from impasto.capture.simulate.camera import EXPOSURE_S, Sensor
 from impasto.capture.simulate.files import ENDINGS, write_image
 from impasto.capture.simulate.illumination import Scene
 from impasto.capture.simulate.manifest import simulated_manifest
@@ -33,8 +33,6 @@ from impasto.progress import progress
 MANIFEST = "capture.toml"
 _STARTED = "truth/settings.json"
 BRACKET_STEP_EV = 2
-# Exposure time written beside the photographs; only ratios of exposure times have a meaning.
-_EXPOSURE_S = 0.1
 _TILT_OF_ARM_DEG = 5.0
 
 
@@ -215,7 +213,7 @@ def simulate(
                 image = sensor.expose(radiance, np.random.default_rng((seed, 1, light, -ev)), ev)
                 if ev == 0:
                     clipped.append(float(np.mean(image >= sensor.full_scale)))
-                write_image(path, image, compression)
+                write_image(path, image, compression, exposure_s=EXPOSURE_S * 2.0**ev)
             advance(1)
     if calibration:
         studio = Studio(placed, scene.camera, sensor, (size[1], size[0]), ending, compression, seed)
@@ -223,10 +221,8 @@ def simulate(
     write_truth(folder / "truth", scene, placed, files, _description(settings))
     # The manifest of the folder itself comes last: it says that all is there.
     for ev, place in reversed(exposures):
-        exposure_s = _EXPOSURE_S * 2.0**ev
-        text = simulated_manifest(
-            files, placed, scene.camera, sensor, ev=ev, exposure_s=_EXPOSURE_S * 2.0**ev
-        )
+        exposure_s = EXPOSURE_S * 2.0**ev
+        text = simulated_manifest(files, placed, scene.camera, sensor, ev=ev, exposure_s=exposure_s)
         write_text(place / MANIFEST, text)
     return Simulation(
         folder=folder,

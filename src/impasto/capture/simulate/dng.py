@@ -9,6 +9,7 @@ import numpy as np
 import tifffile
 from numpy.typing import NDArray
 
+from impasto.images import exposure_tag
 from impasto.output import written_whole
 
 BLACK_LEVEL = 512
@@ -90,5 +91,5 @@ def _tags(exposure_s: float | None, iso: int, camera: str) -> list[tuple[int, st
         (50778, "H", 1, 23, True),  # of D50
     ]
     if exposure_s is not None:
-        tags.append((33434, "2I", 1, rationals(exposure_s), True))
+        tags.append(exposure_tag(exposure_s))
     return sorted(tags)

@@ -14,7 +14,13 @@ from impasto.output import prepare_folder
 ENDINGS = {"tiff": ".tif", "png": ".png", "jpeg": ".jpg", "exr": ".exr", "dng": ".dng"}
 
 
-def write_image(path: Path, image: NDArray[Any], compression: Compression = "zstd") -> None:
+def write_image(
+    path: Path,
+    image: NDArray[Any],
+    compression: Compression = "zstd",
+    *,
+    exposure_s: float | None = None,
+) -> None:
     """Write an image in the format of its ending.
 
     Parameters
@@ -25,6 +31,8 @@ def write_image(path: Path, image: NDArray[Any], compression: Compression = "zst
         uint8 or uint16; float32 for .exr.
     compression : {'zstd', 'deflate', 'lzw', 'none'}, optional
         For .tif only.
+    exposure_s : float, optional
+        Exposure time to note, in .tif and .dng files.
 
     Raises
     ------
@@ -33,12 +41,12 @@ def write_image(path: Path, image: NDArray[Any], compression: Compression = "zst
     """
     prepare_folder(path.parent)
     if path.suffix == ".tif":
-        write_tiff(path, image, None, compression)
+        write_tiff(path, image, None, compression, exposure_s=exposure_s)
     elif path.suffix == ".jpg":
         write_jpeg(path, image)
     elif path.suffix == ".png":
         write_png(path, image, None)
     elif path.suffix == ".dng":
-        write_dng(path, image)
+        write_dng(path, image, exposure_s=exposure_s)
     else:
         write_exr(path, image)
