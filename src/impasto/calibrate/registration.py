@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter, shift
+from scipy.ndimage import gaussian_filter, spline_filter
 
 from impasto.geometry import Array
 
@@ -86,17 +86,14 @@ def register(
     ----------
     [LucasKanade1981]_; [Belhumeur1998]_ for the linear combination.
     """
-    levels = [
-        [np.log(np.maximum(one, 0) / max(float(one.mean()), 1e-9) + _NEARLY_LINEAR) for one in part]
-        for part in parts
-    ]
+    details = [[_detail(one) for one in part] for part in parts]
     found = np.array(start, np.float64)
     largest = [min(part[0].shape) / 8 for part in parts]
     lost = np.abs(found).max(axis=1) > min(largest)
     found[lost] = 0
     everyone = np.ones(len(found), bool)
     for _ in range(_STEPS):
-        displaced, place = _all_parts(levels, corners, found, everyone)
+        displaced, place = _all_parts(details, corners, found, everyone)
         known = np.isfinite(displaced[..., 0]).sum(axis=1)
         lost |= known < max(_LEAST_BLOCKS, displaced.shape[1] // 4)
         step = _medians(displaced)
@@ -108,7 +105,7 @@ def register(
             break
         found[~lost] -= np.median(found[~lost], axis=0)
     halves = [np.arange(len(found)) % 2 == half for half in (0, 1)]
-    one, two = (_medians(_all_parts(levels, corners, found, half)[0]) for half in halves)
+    one, two = (_medians(_all_parts(details, corners, found, half)[0]) for half in halves)
     by_half = np.hypot(*(one - two).T) / 2
     lost |= np.isnan(by_half)
     turns, turned = np.zeros_like(found), np.zeros(len(found))
@@ -136,13 +133,13 @@ def _medians(displaced: Array) -> Array:
 
 
 def _all_parts(
-    parts: Sequence[Sequence[NDArray[np.floating]]],
+    parts: Sequence[Sequence[NDArray[np.float32]]],
     corners: Array,
     found: Array,
     others: NDArray[np.bool_],
 ) -> tuple[Array, Array]:
     """Return what is left of the shifts in the blocks of all parts, and their places in the frame."""
-    made = [_displacements(levels, found, others) for levels in parts]
+    made = [_displacements(details, found, others) for details in parts]
     places = [centres + corner for (_, centres), corner in zip(made, corners, strict=True)]
     return np.concatenate([displaced for displaced, _ in made], axis=1), np.concatenate(places)
 
@@ -154,13 +151,14 @@ def _usual(shifts: Array) -> Array:
 
 
 def _displacements(
-    levels: Sequence[NDArray[np.floating]], found: Array, others: NDArray[np.bool_]
+    details: Sequence[NDArray[np.float32]], found: Array, others: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
     """Return what is left of the shifts in each block of a part, and the blocks' middles.
 
     Parameters
     ----------
-    levels : sequence of ndarray of shape (rows, columns)
+    details : sequence of ndarray of shape (rows, columns)
+        As `_detail` returns them.
     found : ndarray of shape (L, 2)
         Shifts so far.
     others : ndarray of shape (L,), bool
@@ -172,7 +170,7 @@ def _displacements(
         Rows and columns, NaN where the block shows too little.
     centres : ndarray of shape (blocks, 2)
     """
-    detail = np.array([_detail(level, at) for level, at in zip(levels, found, strict=True)])
+    detail = np.array([_shifted(one, at) for one, at in zip(details, found, strict=True)])
     down, across = np.gradient(detail, axis=(1, 2))
     margin = _REACH_PX + int(np.ceil(np.abs(found).max()))
     rows, columns = (_edges(length, margin) for length in detail.shape[1:])
@@ -188,10 +186,35 @@ def _displacements(
     return np.stack(displaced, axis=1), np.array(centres)
 
 
-def _detail(level: NDArray[np.floating], off: Array) -> NDArray[np.float32]:
-    moved = shift(level.astype(np.float32), -off, order=3, mode="nearest")
-    fine = gaussian_filter(moved, _FINE_PX)
-    return np.asarray(fine - gaussian_filter(fine, _COARSE_PX), np.float32)
+def _detail(luminance: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Return the detail of a part that is compared, as the coefficients of its cubic spline."""
+    level = np.log(np.maximum(luminance, 0) / max(float(luminance.mean()), 1e-9) + _NEARLY_LINEAR)
+    fine = gaussian_filter(level, _FINE_PX)
+    return np.asarray(spline_filter(fine - gaussian_filter(fine, _COARSE_PX), order=3, output=np.float32))
+
+
+def _shifted(coefficients: NDArray[np.float32], off: Array) -> NDArray[np.float32]:
+    """Return a part shifted back by rows and columns, from the coefficients of its cubic spline."""
+    for axis, distance in enumerate(off):
+        whole = int(np.floor(distance))
+        part = distance - whole
+        rest = 1 - part
+        weights = (
+            rest**3 / 6,
+            (4 - 6 * part**2 + 3 * part**3) / 6,
+            (4 - 6 * rest**2 + 3 * rest**3) / 6,
+            part**3 / 6,
+        )
+        size = coefficients.shape[axis]
+        beyond = [(0, 0), (0, 0)]
+        beyond[axis] = (abs(whole) + 2,) * 2
+        padded = np.pad(coefficients, beyond, mode="edge")
+        coefficients = np.zeros_like(coefficients)
+        for number, weight in enumerate(weights):
+            start = abs(whole) + 2 + whole - 1 + number
+            taken = padded[start : start + size] if axis == 0 else padded[:, start : start + size]
+            coefficients += np.float32(weight) * taken
+    return coefficients
 
 
 def _edges(length: int, margin: int) -> list[int]:
