@@ -70,7 +70,10 @@ def test_the_photographs_are_read_with_what_the_calibration_shots_told(made):
     assert found.off_deg < 1  # of spheres of a few pixels
     assert found.response.linear
     stack = impasto.open(summary.store)["stack"].attrs
-    assert set(stack["calibration"]) == {"dark", "flat", "white", "colour"}
+    assert set(stack["calibration"]) == {"dark", "flat", "white", "colour", "steadiness"}
+    assert all(entry["brackets"] == [[entry["file"], 0.25]] for entry in stack["inputs"])
+    assert found.glare.share == pytest.approx([0.01] * 3, abs=2e-3)
+    assert found.steadiness.corrected == ()
     assert stack["light_rgb_source"] == "white reference"
     assert found.white.radiance == pytest.approx([0.25] * 3, rel=0.01)
     assert f"{found.off_deg:.2f}° off the simulated lamps" in summary.page.read_text(encoding="utf-8")

@@ -41,6 +41,9 @@ def simulate(
     exposure: Annotated[
         float, typer.Option("--exposure", metavar="SHARE", help="Value of white, as share of full scale.")
     ] = 0.25,
+    vignetting: Annotated[
+        float, typer.Option("--vignetting", metavar="SHARE", help="Light lost in the corners.")
+    ] = 0.0,
     format: Annotated[
         str, typer.Option("--format", metavar="KIND", help="tiff, png, jpeg, exr or dng.")
     ] = "tiff",
@@ -67,6 +70,7 @@ def simulate(
             model=model,
             measured=measured,
             exposure=exposure,
+            vignetting=vignetting,
             format=format,
             bits=bits,
             noise=noise,

@@ -23,7 +23,7 @@ from impasto.maps import maps
 from impasto.render import render
 from impasto.stack import stack
 from impasto.store import open_stack
-from impasto.summaries.calibrate import lights_lines, oecf_lines
+from impasto.summaries.calibrate import glare_lines, lights_lines, oecf_lines, steadiness_lines
 from impasto.summaries.evaluate import evaluate_tables
 from impasto.summaries.experiment import simulate_lines
 from impasto.summaries.fit import fit_lines
@@ -35,6 +35,7 @@ _SIZE = (480, 360)
 _LIGHTS = 45
 _HELD_OUT = 5
 _VIGNETTING = 0.2
+_BRACKETS = 1
 _SWEEP_DEG = tuple(range(-66, 67, 6))
 # What an earlier demo left, and nothing else, may be replaced.
 _PARTS = (
@@ -77,7 +78,7 @@ def demo(
     folder = _clear(Path(out))
     photos, store = folder / "photos", folder / "painting.zarr"
     clock = _Clock(say)
-    seen = f"--size {size[0]},{size[1]} --vignetting {_VIGNETTING}"
+    seen = f"--size {size[0]},{size[1]} --vignetting {_VIGNETTING} --brackets {_BRACKETS}"
     with clock.step("simulate", f"simulate {photos} --dome --lights {_LIGHTS} {seen}"):
         simulated = simulate(
             photos,
@@ -85,15 +86,24 @@ def demo(
             lights=_LIGHTS,
             size=size,
             vignetting=_VIGNETTING,
+            brackets=_BRACKETS,
             show_progress=show_progress,
         )
         say(f"{simulated.photographs} photographs of a still life that does not exist")
     with clock.step("calibrate", *calibration.commands(photos, folder, size)):
         calibrated = calibration.calibrate_studio(photos, folder, size)
-        for line in (*lights_lines(calibrated.lights), *oecf_lines(calibrated.response)):
+        for line in (
+            *lights_lines(calibrated.lights),
+            *oecf_lines(calibrated.response),
+            *glare_lines(calibrated.glare),
+            *steadiness_lines(calibrated.steadiness),
+        ):
             say(line)
     named = {"lights": calibrated.lights_file, **calibrated.files}
-    options = " ".join(f"--{name} {file}" for name, file in named.items())
+    exposures = sorted((photos / "brackets").iterdir())
+    options = " ".join(
+        [f"--{name} {file}" for name, file in named.items()] + [f"--brackets {one}" for one in exposures]
+    )
     with clock.step("stack", f"stack {photos} {store} {options}"):
         stacked = stack(
             photos,
@@ -103,6 +113,8 @@ def demo(
             flat=calibrated.flat.file,
             white=calibrated.white.file,
             colour=calibrated.colour.file,
+            steadiness=calibrated.steadiness.file,
+            brackets=exposures,
             show_progress=show_progress,
         )
         for line in stack_lines(stacked):

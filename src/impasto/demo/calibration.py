@@ -1,7 +1,8 @@
-"""The demo's calibration from shots that the simulator makes: spheres, grey scale, cap on, card, colours."""
+"""The demo's calibration from shots of the simulator: spheres, grey scale, cap on, card, colours, trap."""
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,8 +12,10 @@ from impasto import calibrate
 from impasto.calibrate.colour import Colour
 from impasto.calibrate.dark import Dark
 from impasto.calibrate.flat import Flat
+from impasto.calibrate.glare import Glare
 from impasto.calibrate.lights import LightsCalibration
 from impasto.calibrate.oecf import Oecf
+from impasto.calibrate.steadiness import Steadiness
 from impasto.calibrate.white import White
 from impasto.capture import read_capture
 from impasto.geometry import Lights
@@ -44,6 +47,8 @@ class CalibrationSummary:
     flat: Flat
     white: White
     colour: Colour
+    glare: Glare
+    steadiness: Steadiness
 
     @property
     def lights_file(self) -> Path:
@@ -53,7 +58,7 @@ class CalibrationSummary:
     @property
     def files(self) -> dict[str, Path]:
         """The calibration files that `stack` applies, by kind."""
-        return {name: getattr(self, name).file for name in ("dark", "flat", "white", "colour")}
+        return {name: getattr(self, name).file for name in ("dark", "flat", "white", "colour", "steadiness")}
 
 
 def commands(photos: Path, folder: Path, size: tuple[int, int]) -> tuple[str, ...]:
@@ -71,6 +76,9 @@ def commands(photos: Path, folder: Path, size: tuple[int, int]) -> tuple[str, ..
         f"--lights {made}/lights/lights.toml --light {frontal}",
         f"calibrate colour {shots}/colour_chart.tif {shots}/colour_chart.csv {made}/colour.json "
         f"--card {shots}/white_card.tif --dark {made}/dark.json",
+        f"calibrate glare {shots}/glare.tif "
+        + " ".join(f"--{name} {','.join(map(str, box))}" for name, box in _areas(shots).items()),
+        f"calibrate steadiness {photos} {made}/steadiness.json",
     )
 
 
@@ -117,10 +125,19 @@ def calibrate_studio(photos: Path, folder: Path, size: tuple[int, int]) -> Calib
         card=shots / "white_card.tif",
         dark=dark.file,
     )
+    areas = _areas(shots)
+    glare = calibrate.glare(shots / "glare.tif", trap=areas["trap"], bright=areas["bright"])
+    steadiness = calibrate.steadiness(photos, made / "steadiness.json")
     order = [true.names.index(name) for name in lights.names]
     cosine = np.sum(true.direction[order] * lights.lights.direction, axis=1)
     off_deg = float(np.median(np.degrees(np.arccos(np.clip(cosine, -1, 1)))))
-    return CalibrationSummary(lights, off_deg, response, dark, flat, white, colour)
+    return CalibrationSummary(lights, off_deg, response, dark, flat, white, colour, glare, steadiness)
+
+
+def _areas(shots: Path) -> dict[str, tuple[int, ...]]:
+    """Return where the black trap and the card beside it lie, by name."""
+    with (shots / "glare.csv").open(encoding="utf-8") as file:
+        return {row.pop("area"): tuple(map(int, row.values())) for row in csv.DictReader(file)}
 
 
 def _middle(size: tuple[int, int]) -> tuple[int, int, int, int]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from impasto.calibrate.steadiness import Steadiness
 from impasto.colour import encode_srgb, quantise
 from impasto.console import versions
 from impasto.demo.calibration import CalibrationSummary
@@ -180,6 +181,7 @@ def _write_calibration(part: Section, calibrated: CalibrationSummary) -> None:
     """Write what the simulated calibration shots told."""
     lights, response, colour = calibrated.lights, calibrated.response, calibrated.colour
     left_out = np.mean(colour.fits[colour.chosen].left_out)
+    glare = float(calibrated.glare.share.mean())
     use = "needs no function of its own" if response.linear else "got a function of its own"
     part.table(
         ("shot", "what it told"),
@@ -198,10 +200,27 @@ def _write_calibration(part: Section, calibrated: CalibrationSummary) -> None:
                 f"{calibrated.white.radiance.mean():.4f} of full scale",
             ),
             ("colour chart", f"CIEDE2000 {left_out:.2f} for patches left out of the fit"),
+            (
+                "black trap in a white card",
+                f"the lens adds {percent(glare)} of the card's light to what is black beside it",
+            ),
+            (
+                "the photographs themselves",
+                _steady(calibrated.steadiness),
+            ),
         ],
         caption="Simulated shots for calibration, with which the photographs were read",
         words=True,
     )
+
+
+def _steady(found: Steadiness) -> str:
+    """Say whether the photographs lie on each other."""
+    off = np.hypot(*found.shift_px.T)
+    if not np.isfinite(off).any():
+        return "show too little to tell whether the camera moved"
+    back = count(len(found.corrected), "photograph")
+    return f"lie within {np.nanmax(off):.2f} px of each other; {back} had to be shifted back"
 
 
 def _write_observers(part: Section, compared: ObserversSummary) -> None:
