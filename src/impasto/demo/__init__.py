@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import islice
 from os import PathLike
 from pathlib import Path
 
@@ -133,7 +134,7 @@ def demo(
         evaluated = evaluate(
             store, models=MODELS, held_out_lights=held.names, baselines=False, show_progress=show_progress
         )
-        for heading, header, rows in evaluate_tables(evaluated):
+        for heading, header, rows in islice(evaluate_tables(evaluated), len(MODELS)):
             say(f"{heading}: " + ", ".join(f"{header[k]} {rows[-1][k]}" for k in (2, 3, 4)))
     sweep = f"{_SWEEP_DEG[0]}:{_SWEEP_DEG[-1]}:{_SWEEP_DEG[1] - _SWEEP_DEG[0]}"
     renderings = folder / "renderings"

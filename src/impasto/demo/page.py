@@ -267,7 +267,8 @@ def _held_out_pictures(summary: DemoSummary) -> Iterator[list[Picture]]:
 
 def _errors(evaluated: EvaluateSummary) -> tuple[list[str], list[list[str]]]:
     """Return the models' errors side by side: the columns' names, and a row per light and for the mean."""
-    tables = list(evaluate_tables(evaluated))
+    # Further tables tell other things than the errors of a model.
+    tables = list(evaluate_tables(evaluated))[: len(evaluated.models)]
     _, names, rows = tables[0]
     columns = range(2, len(names))
     header = [*names[:2]] + [
