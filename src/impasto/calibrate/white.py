@@ -11,7 +11,7 @@ import numpy as np
 
 from impasto.calibrate.files import subject_of, write_calibration
 from impasto.calibrate.response_file import response_table
-from impasto.calibrate.shots import Shot, box_mean, box_problems, photographs_in, read_shots
+from impasto.calibrate.shots import Shot, box_mean, box_problems, one_by_one, photographs_in
 from impasto.capture.light_files import read_light_file
 from impasto.capture.lights import LightFile, LightRow
 from impasto.errors import CaptureError, OptionError, Problem, raise_problems
@@ -96,29 +96,33 @@ def white(
     OutputError
         If the file cannot be written.
     """
-    shots = read_shots(photographs_in(Path(photos)))
+    paths = photographs_in(Path(photos))
     file = read_light_file(Path(lights))
     tilt = np.asarray(normal, np.float64)
-    problems = [*box_problems(box, shots[0].codes.shape, "--box"), *_light_problems(light, shots, file)]
+    problems = _light_problems(light, len(paths), file)
     if not 0 < reflectance <= 1.2:
         problems.append(
             Problem(f"--reflectance {reflectance:g}", "is not from 0 to 1", "Give it as a share of 1")
         )
     if tilt.shape != (3,) or not tilt[2] > 0:
         problems.append(Problem("--normal", "does not point up", "Give x,y,z with z above 0"))
-    raise_problems(OptionError, problems)
-    tilt = tilt / np.linalg.norm(tilt)
-    raise_problems(CaptureError, file.problems)
-    table = response_table(oecf, shots)
+    shots: list[Shot] = []
     found = []
-    clipped = []
-    for shot in shots:
+    clipped = False
+    # One photograph at a time is in memory; but for the first, only what is said about it is kept.
+    for shot in one_by_one(paths):
+        if not shots:
+            raise_problems(OptionError, [*box_problems(box, shot.codes.shape, "--box"), *problems])
+            raise_problems(CaptureError, file.problems)
+            tilt = tilt / np.linalg.norm(tilt)
+            table = response_table(oecf, [shot])
+        shots.append(shot.without_pixels if shots else shot)
         row = _row(light or shot.name, file)
         if row is None:
             continue
         left, top, right, bottom = box
         if shot.clipped[top:bottom, left:right].mean() > _CLIPPED:
-            clipped.append(shot)
+            clipped = True
             continue
         irradiance = _irradiance(shot, row, file, box, tilt, height_mm)
         if irradiance is not None:
@@ -156,13 +160,13 @@ def _row(name: str, file: LightFile) -> LightRow | None:
     return next((row for row in file.rows if Path(row.file or "").stem == name), None)
 
 
-def _light_problems(light: str | None, shots: list[Shot], file: LightFile) -> list[Problem]:
+def _light_problems(light: str | None, shots: int, file: LightFile) -> list[Problem]:
     """Return what is wrong with the name of a single photograph's light."""
     if light is None:
         return []
     where, problems = f"--light {light}", []
-    if len(shots) > 1:
-        what = f"names one light for {len(shots)} photographs"
+    if shots > 1:
+        what = f"names one light for {shots} photographs"
         problems.append(Problem(where, what, "Give one photograph, or name them like their lights"))
     if not file.problems and _row(light, file) is None:
         problems.append(Problem(where, f"is no light in {file.path.name}", "Correct the name"))
