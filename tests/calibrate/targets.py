@@ -25,7 +25,8 @@ def photograph(
 ):
     """Return linear radiance (H, W, 3), and where the middles of the 24 patches lie, column first.
 
-    `turns` are quarter turns against the clock, `perspective` is by how much the lower edge is longer,
+    `turns` are quarter turns against the clock, `perspective` is by how much the lower end is wider than the
+    upper one, as a share of the middle,
     `covered` are rows and columns of the chart under a grey card, `haze` is the share of light that is
     veiling glare. The light falls off by 20 % across the frame.
     """

@@ -6,11 +6,13 @@ import json
 import numpy as np
 import pytest
 import tifffile
+from tests.calibrate.shots import take_shots
 from tests.calibrate.targets import painting, photograph, scattered
 from typer.testing import CliRunner
 
 import impasto
 from impasto.calibrate.find_target import find_target
+from impasto.calibrate.patches import read_patches
 from impasto.capture.simulate.charts import colour_chart
 from impasto.cli.commands import app
 from impasto.errors import CaptureError, OptionError
@@ -118,6 +120,19 @@ def test_the_table_feeds_the_camera_s_colour(photo, tmp_path):
     with table.open() as lines:
         boxes = [[int(row[edge]) for edge in row if edge.endswith("_px")] for row in csv.DictReader(lines)]
     assert content["boxes_px"] == boxes
+
+
+@pytest.mark.parametrize("response", ["linear", "tone"])
+def test_the_simulator_s_own_shot_is_found_where_its_table_says(tmp_path, response):
+    """In uneven light, with vignetting, also by a camera whose response bends and is not known."""
+    take_shots(tmp_path, distance_mm=600, vignetting=0.2, response=response)
+    impasto.calibrate.target(tmp_path / "colour_chart.tif", tmp_path / "found.csv")
+    found, told = (read_patches(tmp_path / name) for name in ("found.csv", "colour_chart.csv"))
+    assert found.names == told.names
+    middles = [
+        np.add(np.array(table.boxes)[:, :2], np.array(table.boxes)[:, 2:]) / 2 for table in (found, told)
+    ]
+    np.testing.assert_allclose(*middles, atol=1)
 
 
 def test_the_neutral_patches_feed_the_response(photo, tmp_path):
