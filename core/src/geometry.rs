@@ -59,20 +59,6 @@ impl<R: Real> Illumination<R> {
     }
 }
 
-impl<R: Copy> Illumination<R> {
-    /// The same in other numbers.
-    #[inline(always)]
-    pub fn map<S: Copy>(&self, number: impl Fn(R) -> S) -> Illumination<S> {
-        Illumination {
-            light: array!(|i| number(self.light[i])),
-            view: array!(|i| number(self.view[i])),
-            half: array!(|i| number(self.half[i])),
-            per_light_half: number(self.per_light_half),
-            facet_reflectance: number(self.facet_reflectance),
-        }
-    }
-}
-
 /// n · l and n · v, and where both are positive: elsewhere the element is not lit or not seen.
 #[inline(always)]
 pub fn facing<N: Number>(normal: [N; 3], at: &Illumination<N::Real>) -> (N, N, <N::Real as Real>::Mask) {

@@ -188,7 +188,6 @@ impl<const ISA: Isa, const C: usize> Group<ISA, C> {
             let stored = stack.stored::<ISA, C>(light, &pixel);
             let mut left_out = LaneMask::NONE;
             if let Some(mask) = stack.sample_mask {
-                // Through a lane: the compiler would keep a mask that is made element by element out of the vectors.
                 left_out = Lane::<ISA>(array!(|i| f32::from(mask[light * stack.pixels + pixel[i]]))).positive();
             }
             let mut any_usable = LaneMask::NONE;
