@@ -103,6 +103,10 @@ class Pixels:
         }
         return replace(self, **chosen)
 
+    def without_highlights(self) -> Pixels:
+        """Return the pixels with their diffuse and ambient terms alone."""
+        return replace(self, specular=np.zeros_like(self.specular))
+
 
 def join_pixels(parts: Sequence[Pixels]) -> Pixels:
     """Return pixels of one fit, at least one part, as a whole."""

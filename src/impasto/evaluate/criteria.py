@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -98,7 +98,7 @@ def _split(values: NDArray[Any], highlight: NDArray[np.bool_]) -> Array:
 def is_highlight(pixels: Pixels, stack: Stack) -> NDArray[np.bool_]:
     """Return under which lights a pixel shows its highlight, as a model has it, shape (L, P)."""
     whole = render_pixels(pixels, stack.lights, stack.camera).sum(axis=-1)
-    matte = replace(pixels, specular=np.zeros_like(pixels.specular))
+    matte = pixels.without_highlights()
     diffuse = render_pixels(matte, stack.lights, stack.camera).sum(axis=-1)
     result: NDArray[np.bool_] = whole - diffuse > HIGHLIGHT_SHARE * whole
     return result

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -154,7 +154,7 @@ class CurveSums:
         self._measured += np.where(usable[..., None], measured / intensity, 0.0).sum(axis=1)
         for name, pixels in chosen.items():
             total = render_pixels(pixels, lights, self._stack.camera) / intensity
-            matte = replace(pixels, specular=np.zeros_like(pixels.specular))
+            matte = pixels.without_highlights()
             diffuse = render_pixels(matte, lights, self._stack.camera) / intensity
             parts = np.stack([diffuse, total - diffuse])
             self._models[name] += np.where(usable[..., None], parts, 0.0).sum(axis=2)
@@ -211,7 +211,7 @@ def _sweep(pixel: Pixels, angle_deg: Array, arm: Arm, camera: Camera) -> Sweep:
         names=tuple(f"{angle:g}" for angle in angles),
         direction=turn_about_z(arm_direction(np.radians(angles)), arm.azimuth),
     )
-    matte = replace(pixel, specular=np.zeros_like(pixel.specular))
+    matte = pixel.without_highlights()
     total, diffuse = (render_pixels(each, lights, camera)[:, 0].astype(np.float64) for each in (pixel, matte))
     return Sweep(angles, diffuse, total - diffuse)
 

@@ -15,7 +15,7 @@ from impasto.fit import FitOptions, fit_tile
 from impasto.fit.remainder import usual_toe
 from impasto.geometry import Array, Camera, Lights, position_mm
 from impasto.models import ModelSpec
-from impasto.pixels import pixels_of_maps, render_pixels
+from impasto.pixels import Pixels, pixels_of_maps, render_pixels
 from impasto.residual import encode
 from impasto.store import Fit, Maps, Stack
 
@@ -177,18 +177,16 @@ def error_shares(model: ModelSpec, seen: Photographed, options: FitOptions) -> E
     ]
     rest = [_rest(model, seen, lights, maps, options) for lights, maps in fits]
     usable = seen.usable & np.logical_and.reduce([np.isfinite(part) for part in rest])
+    samples = max(int(usable.sum()), 1)
     kept = usable & ~shadow[..., None]
     squares = [np.square(part, dtype=np.float64) for part in rest]
     total = float(squares[0][usable].sum())
-    rms = float(np.sqrt(total / max(int(usable.sum()), 1)))
+    rms = float(np.sqrt(total / samples))
     after_lights = min(total, float(squares[1][usable].sum()))
     after_shadows = min(after_lights, float(squares[2][kept].sum()))
     noise = min(after_shadows, _expected_noise(model, seen, kept))
-    if total == 0.0:
-        total = noise = after_lights = after_shadows = (
-            1.0  # a perfect fit, of which noise is all that is known
-        )
-    samples = max(int(usable.sum()), 1)
+    if total == 0.0:  # a perfect fit, of which noise is all that is known
+        total = noise = after_lights = after_shadows = 1.0
     return ErrorShares(
         model=(after_shadows - noise) / total,
         lights=(total - after_lights) / total,
@@ -220,17 +218,20 @@ def _fit(
     )
 
 
-def _render(
-    model: ModelSpec, seen: Photographed, lights: Lights, maps: Mapping[str, Any], options: FitOptions
-) -> Values:
+def _pixels(model: ModelSpec, seen: Photographed, maps: Mapping[str, Any], options: FitOptions) -> Pixels:
     attributes = {
         "model": model.name,
         "light_rgb": seen.light_rgb,
         "index_of_refraction": options.index,
         "fresnel": options.fresnel,
     }
-    pixels = pixels_of_maps(attributes, seen.size, seen.row, seen.column, maps)
-    return render_pixels(pixels, lights, seen.camera)
+    return pixels_of_maps(attributes, seen.size, seen.row, seen.column, maps)
+
+
+def _render(
+    model: ModelSpec, seen: Photographed, lights: Lights, maps: Mapping[str, Any], options: FitOptions
+) -> Values:
+    return render_pixels(_pixels(model, seen, maps, options), lights, seen.camera)
 
 
 def _encoded(values: Values, toe: float) -> Values:
@@ -338,8 +339,8 @@ def _corrected(lights: Lights, correction: Array) -> Lights:
 
 def _shadowed(model: ModelSpec, seen: Photographed, lights: Lights, maps: Maps, options: FitOptions) -> Mask:
     """Return which samples (L, P) lie in a cast shadow; see `error_shares`."""
-    matte = {**maps, "specular": np.zeros_like(maps["specular"])} if "specular" in maps else maps
-    expected = _render(model, seen, lights, matte, options).mean(axis=2)
+    matte = _pixels(model, seen, maps, options).without_highlights()
+    expected = render_pixels(matte, lights, seen.camera).mean(axis=2)
     measured = np.where(seen.usable, seen.radiance, np.nan).mean(axis=2)
     sigma = np.sqrt(seen.variance.mean(axis=2) / seen.radiance.shape[2])
     dark: Mask = (measured < _SHADOW_SHARE * expected) & (expected - measured > _SHADOW_SIGMAS * sigma)

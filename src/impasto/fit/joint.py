@@ -120,7 +120,7 @@ class Joint:
         if self._options.residual or self._options.calibrates:
             sample = _SampledPixels(self, sample_pixels(self._stack, self.lights, show_progress))
             toe = sample.toe
-            strength = None
+            calibration = None
             if self._options.calibrates:
                 calibration = self_calibrate(
                     sample,
@@ -130,7 +130,6 @@ class Joint:
                 )
                 self._selected = calibration.lights
                 attributes["self_calibration"] = calibration.attributes()
-                strength = find_strength(calibration.lights.direction, calibration.departure)
                 notes += _calibration_notes(calibration)
             if self._options.residual:
                 self._remainder = find_remainder(
@@ -140,7 +139,9 @@ class Joint:
                     self._options.residual_components,
                 )
                 attributes["residual"] = self._remainder.attributes
-                if strength:
+                if calibration is not None and (
+                    strength := find_strength(calibration.lights.direction, calibration.departure)
+                ):
                     attributes["residual"]["strength"] = strength
                 notes += _residual_notes(self._remainder.attributes)
         return Findings(attributes, notes)
@@ -226,9 +227,8 @@ class _SampledPixels:
         return self.procedure.fit_pixels(self.sample.values, self.sample.row, self.sample.column, lights)
 
     def radiance(self, maps: stores.Maps, lights: Lights, *, highlights: bool = True) -> NDArray[np.float32]:
-        if not highlights and "specular" in maps:
-            maps = {**maps, "specular": np.zeros_like(maps["specular"])}
-        return self.procedure.render(self.procedure.pixels(maps, self.sample.row, self.sample.column), lights)
+        pixels = self.procedure.pixels(maps, self.sample.row, self.sample.column)
+        return self.procedure.render(pixels if highlights else pixels.without_highlights(), lights)
 
     def measured(self) -> NDArray[np.float32]:
         return self.procedure.measured(self.sample.values)

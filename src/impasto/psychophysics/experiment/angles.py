@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,7 +154,7 @@ def highlight_shares(
         seen += len(band)
     pixels = join_pixels(parts)
     pixels = pixels.select(~pixels.missing)
-    matte = replace(pixels, specular=np.zeros_like(pixels.specular))
+    matte = pixels.without_highlights()
     shares = []
     for light in lights:
         one = stack.lights.select([light])
