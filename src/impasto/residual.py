@@ -115,11 +115,8 @@ class ResidualTerm:
             hull=array("hull"),
             fade=float(found["fade"]),
             table=array("table").astype(np.float32) if published else None,
-            **(
-                {"strength_length": strength["length"], "strength_weights": np.array(strength["weights"])}
-                if strength
-                else {}
-            ),
+            strength_length=float(strength["length"]) if strength else 1.0,
+            strength_weights=np.array(strength["weights"], np.float64) if strength else None,
         )
 
     @property
