@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 import impasto
 from impasto.evaluate.held_out import spread_lights
 from impasto.fit import FitOptions
+from impasto.geometry import degrees_between
 from impasto.store import open_fit, open_stack
 
 MODEL = "torrance-sparrow-ambient"
@@ -60,14 +61,14 @@ def measure(
     fitted = fit.read(rows, columns, ["normal"])["normal"].astype(np.float64)
     stereo = _photometric_stereo(store, others)
     return {
-        "directions stated, deg rms": _rms(_degrees(stated.direction[others], true_direction[others])),
-        "directions found, deg rms": _rms(_degrees(used, true_direction[others])),
+        "directions stated, deg rms": _rms(degrees_between(stated.direction[others], true_direction[others])),
+        "directions found, deg rms": _rms(degrees_between(used, true_direction[others])),
         "strengths off, % median": 100 * float(np.median(np.abs(off))),
         "strengths off, % rms": 100 * _rms(off),
         "held out, dB": judged.models[0].mean.psnr_db,
         "best without a model, dB": max(method.mean.psnr_db for method in judged.baselines),
-        "normals off, deg mean": float(np.nanmean(_degrees(fitted, normal))),
-        "photometric stereo, deg mean": float(np.nanmean(_degrees(stereo, normal))),
+        "normals off, deg mean": float(np.nanmean(degrees_between(fitted, normal))),
+        "photometric stereo, deg mean": float(np.nanmean(degrees_between(stereo, normal))),
     }
 
 
@@ -104,14 +105,6 @@ def _photometric_stereo(store: Path, lights: NDArray[np.intp]) -> Array:
     scaled = np.linalg.lstsq(chosen.direction, grey.reshape(len(lights), -1), rcond=None)[0].T
     normal: Array = (scaled / np.linalg.norm(scaled, axis=1, keepdims=True)).reshape(height, width, 3)
     return normal
-
-
-def _degrees(first: Array, second: Array) -> Array:
-    cosine = (
-        np.sum(first * second, axis=-1) / np.linalg.norm(first, axis=-1) / np.linalg.norm(second, axis=-1)
-    )
-    result: Array = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    return result
 
 
 def _rms(values: Array) -> float:

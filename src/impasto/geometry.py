@@ -58,6 +58,13 @@ def zenith_azimuth(direction: ArrayLike) -> tuple[Array, Array]:
     return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
 
+def degrees_between(first: ArrayLike, second: ArrayLike) -> Array:
+    """Return the angles in degrees between unit vectors (..., 3) and (..., 3), shape (...)."""
+    cosine = np.sum(np.asarray(first, np.float64) * np.asarray(second, np.float64), axis=-1)
+    result: Array = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return result
+
+
 def tilt_direction(theta: ArrayLike, phi: ArrayLike) -> Array:
     """Return unit vectors for the paper's signed tilts θ (in the arm's plane) and φ (out of it).
 

@@ -18,7 +18,7 @@ from impasto.calibrate.oecf import Oecf
 from impasto.calibrate.steadiness import Steadiness
 from impasto.calibrate.white import White
 from impasto.capture import read_capture
-from impasto.geometry import Lights
+from impasto.geometry import Lights, degrees_between
 
 PART = "calibration"
 """What it makes in the demo's folder."""
@@ -129,8 +129,7 @@ def calibrate_studio(photos: Path, folder: Path, size: tuple[int, int]) -> Calib
     glare = calibrate.glare(shots / "glare.tif", trap=areas["trap"], bright=areas["bright"])
     steadiness = calibrate.steadiness(photos, made / "steadiness.json")
     order = [true.names.index(name) for name in lights.names]
-    cosine = np.sum(true.direction[order] * lights.lights.direction, axis=1)
-    off_deg = float(np.median(np.degrees(np.arccos(np.clip(cosine, -1, 1)))))
+    off_deg = float(np.median(degrees_between(true.direction[order], lights.lights.direction)))
     return CalibrationSummary(lights, off_deg, response, dark, flat, white, colour, glare, steadiness)
 
 

@@ -12,7 +12,7 @@ from impasto import store as stores
 from impasto.arm import find_arm
 from impasto.fit.light_directions import MIN_LIGHTS, correct_directions
 from impasto.fit.strength import TELLING
-from impasto.geometry import Array, Lights
+from impasto.geometry import Array, Lights, degrees_between
 
 WORTH_DB = 0.1
 """How much closer lights left out have to be met for corrected directions to be used."""
@@ -100,11 +100,11 @@ def self_calibrate(pixels: PixelFit, thinned: PixelFit, lights: Lights, *, direc
         return stated
     corrected = find_strengths(pixels, correct_directions(thinned, lights))
     error = [pixels.left_out_db(found.lights) for found in (stated, corrected)]
-    cosine = np.sum(lights.direction * corrected.lights.direction, axis=1)
+    turned = degrees_between(lights.direction, corrected.lights.direction)
     found = {
         "used": error[1] - error[0] > WORTH_DB,
         "left_out_db": {"stated": error[0], "corrected": error[1]},
-        "turned_deg": np.round(np.degrees(np.arccos(np.minimum(cosine, 1.0))), 3).tolist(),
+        "turned_deg": np.round(turned, 3).tolist(),
         "corrected": np.round(corrected.lights.direction, 6).tolist(),
     }
     return replace(corrected if found["used"] else stated, directions=found)

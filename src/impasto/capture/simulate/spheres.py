@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.capture.simulate.illumination import light_at
-from impasto.geometry import Array, Camera, Lights, pixel_position_mm
+from impasto.geometry import Array, Camera, Lights, degrees_between, pixel_position_mm
 
 SPHERES_PX = (200, 360)
 CENTRES_MM = ((-43.0, 0.0), (43.0, 0.0))
@@ -92,7 +92,7 @@ def _seen(place: Array, camera: Camera, lights: Lights, light: int) -> tuple[Arr
         normal = (point - centre) / RADIUS_MM
         mirror = 2 * (normal @ view)[:, None] * normal - view
         towards, _ = light_at(lights, light, point)
-        off_deg = np.degrees(np.arccos(np.clip(np.sum(mirror * towards, axis=-1), -1, 1)))
+        off_deg = degrees_between(mirror, towards)
         lamp = np.clip(1.5 - off_deg / (lamp_deg / 2), 0, 1)
         studio = 0.02 + 0.03 * np.maximum(mirror[:, 2], 0)
         image[hit] = studio + _LAMP_RADIANCE * lamp
