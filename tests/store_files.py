@@ -49,6 +49,16 @@ def flip_byte(path, position):
     path.write_bytes(bytes(data))
 
 
+def photograph(store, light):
+    """Return the shard of a photograph in a stack."""
+    return store / "stack" / "radiance" / "c" / str(light) / "0" / "0" / "0"
+
+
+def chunks_in(shard, count):
+    """Return offset and size of each of the `count` chunks of a shard, by the index at its end."""
+    return np.frombuffer(shard.read_bytes()[-4 - 16 * count : -4], "<u8").reshape(count, 2).tolist()
+
+
 def attributes(group):
     """Return the attributes of a group or array."""
     return json.loads((group / "zarr.json").read_text())["attributes"]

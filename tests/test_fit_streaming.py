@@ -13,7 +13,15 @@ from impasto.errors import ImpastoError, OptionError, StoreError
 from impasto.fit import FitOptions, fit, streaming
 from impasto.geometry import dome_direction
 from impasto.stack import stack
-from store_files import attributes, contents, flip_byte, largest_file, write_capture
+from store_files import (
+    attributes,
+    chunks_in,
+    contents,
+    flip_byte,
+    largest_file,
+    photograph,
+    write_capture,
+)
 
 HEIGHT, WIDTH = 1100, 1040
 
@@ -262,7 +270,8 @@ def test_room_is_checked_before_anything_is_fitted(small, monkeypatch):
 
 def test_damage_of_the_stack_names_the_photograph(stacked, tmp_path, first_samples):
     path = copy(stacked, tmp_path / "s.zarr")
-    flip_byte(path / "stack" / "radiance" / "c" / "4" / "2" / "1" / "0", 500)
+    shard = photograph(path, 4)
+    flip_byte(shard, chunks_in(shard, 9)[2 * 3 + 1][0] + 500)
     with pytest.raises(StoreError, match=r"light04 is damaged at rows 1024 to 1099, columns 512 to 1023"):
         fit(path, models=["lambert"])
 

@@ -7,31 +7,33 @@ import pytest
 import zarr
 from zarr.codecs import ZstdCodec
 
+from impasto import store as stores
+from impasto.stack import stack
 from impasto.store.chunks import encode_chunks
 from impasto.store.hierarchy import open_array
-from impasto.store.layout import UNIT, Map, fit_maps
-from impasto.store.shards import write_metadata, write_shard
+from impasto.store.layout import Map, fit_maps
+from store_files import chunks_in, noise_images, write_capture
 
 STATUS = Map("status", None, 1, "1", "how it ended", dtype="uint8")
 DIFFUSE = Map("diffuse", "channel", 3, "1", "diffuse magnitude")
+GROUP = "fits/any"
 HEIGHT, WIDTH = 1100, 300
 
 
-def written(tmp_path, map):
-    """Write an array of two units and return what it should hold."""
+def written(tmp_path):
+    """Write arrays of two units, and return by name what they should hold."""
     rng = np.random.default_rng(2)
-    values = rng.integers(0, 6, map.shape(HEIGHT, WIDTH)).astype(map.dtype)
-    write_metadata(tmp_path / map.name, map, HEIGHT, WIDTH)
-    last = () if map.axis is None else ("0",)
-    for number in (0, 1):
-        shard = tmp_path.joinpath(map.name, "c", str(number), "0", *last)
-        write_shard(shard, map, values[number * UNIT : (number + 1) * UNIT])
+    maps = (DIFFUSE, STATUS)
+    values = {map.name: rng.integers(0, 6, map.shape(HEIGHT, WIDTH)).astype(map.dtype) for map in maps}
+    writer = stores.MapsWriter(tmp_path, GROUP, maps, HEIGHT, WIDTH, {})
+    for unit in stores.units(HEIGHT, WIDTH):
+        writer.write(unit, {name: whole[unit.rows, unit.columns] for name, whole in values.items()})
     return values
 
 
 @pytest.mark.parametrize("map", [STATUS, DIFFUSE], ids=lambda map: map.name)
-def test_metadata_are_those_of_zarr(tmp_path, map):
-    write_metadata(tmp_path / map.name, map, HEIGHT, WIDTH)
+def test_metadata_of_maps_are_those_of_zarr(tmp_path, map):
+    written(tmp_path)
     last = () if map.axis is None else (map.size,)
     zarr.create_array(
         tmp_path / "zarr",
@@ -45,36 +47,65 @@ def test_metadata_are_those_of_zarr(tmp_path, map):
         compressors=[ZstdCodec(level=-1, checksum=True)],
         zarr_format=3,
     )
-    ours, zarrs = (json.loads((tmp_path / name / "zarr.json").read_text()) for name in (map.name, "zarr"))
-    assert ours == zarrs
+    assert document(tmp_path / GROUP / map.name) == document(tmp_path / "zarr")
+
+
+def test_metadata_of_a_stack_are_those_of_zarr(tmp_path):
+    stack(write_capture(tmp_path / "photos", noise_images(2, 600, 1030)), tmp_path / "s.zarr")
+    zarr.create_array(
+        tmp_path / "zarr",
+        shape=(2, 600, 1030, 3),
+        dtype=np.uint16,
+        dimension_names=("light", "y", "x", "channel"),
+        chunks=(1, 512, 512, 3),
+        shards=(1, 1024, 1536, 3),
+        fill_value=65535,
+        attributes={"long_name": "relative radiance, as scale * value + offset", "units": "1"},
+        compressors=[ZstdCodec(level=-200, checksum=True)],
+        zarr_format=3,
+    )
+    zarr.create_array(
+        tmp_path / "names",
+        shape=(2,),
+        dtype=str,
+        dimension_names=("light",),
+        chunks=(2,),
+        fill_value="",
+        attributes={"long_name": "name of the photograph"},
+        compressors=[ZstdCodec(level=-1, checksum=True)],
+        zarr_format=3,
+    )
+    assert document(tmp_path / "s.zarr" / "stack" / "radiance") == document(tmp_path / "zarr")
+    assert document(tmp_path / "s.zarr" / "stack" / "light_name") == document(tmp_path / "names")
+
+
+def document(array):
+    return json.loads((array / "zarr.json").read_text())
 
 
 @pytest.mark.parametrize("map", [STATUS, DIFFUSE], ids=lambda map: map.name)
 def test_zarr_and_zarrs_read_the_pixels(tmp_path, map):
-    values = written(tmp_path, map)
-    np.testing.assert_array_equal(zarr.open_array(tmp_path / map.name, mode="r")[...], values)
-    np.testing.assert_array_equal(open_array(tmp_path, map.name)[...], values)
-    np.testing.assert_array_equal(
-        open_array(tmp_path, map.name)[1000:1050, 100:270], values[1000:1050, 100:270]
-    )
+    values = written(tmp_path)[map.name]
+    path = f"{GROUP}/{map.name}"
+    np.testing.assert_array_equal(zarr.open_array(tmp_path / path, mode="r")[...], values)
+    np.testing.assert_array_equal(open_array(tmp_path, path)[...], values)
+    np.testing.assert_array_equal(open_array(tmp_path, path)[1000:1050, 100:270], values[1000:1050, 100:270])
 
 
 @pytest.mark.parametrize("position", [100, -2, -30])
 def test_a_flipped_byte_is_found(tmp_path, position):
-    written(tmp_path, DIFFUSE)
-    shard = tmp_path / "diffuse" / "c" / "1" / "0" / "0"
+    written(tmp_path)
+    shard = tmp_path / GROUP / "diffuse" / "c" / "1" / "0" / "0"
     data = bytearray(shard.read_bytes())
     data[position] ^= 4
     shard.write_bytes(bytes(data))
     with pytest.raises((OSError, RuntimeError, ValueError)):
-        open_array(tmp_path, "diffuse")[...]
+        open_array(tmp_path, f"{GROUP}/diffuse")[...]
 
 
 def test_only_chunks_with_pixels_are_in_a_shard(tmp_path):
-    written(tmp_path, STATUS)
-    index = np.frombuffer((tmp_path / "status" / "c" / "1" / "0").read_bytes()[-260:-4], "<u8").reshape(
-        4, 4, 2
-    )
+    written(tmp_path)
+    index = np.reshape(chunks_in(tmp_path / GROUP / "status" / "c" / "1" / "0", 16), (4, 4, 2))
     there = index[..., 0] != 2**64 - 1
     assert there.tolist() == [[True, True, False, False], *[[False] * 4] * 3]
     assert index[0, 0, 0] == 0
@@ -88,8 +119,9 @@ def test_chunks_that_hold_the_fill_value_only_are_written():
 
 
 def test_every_map_of_a_fit_has_a_type_that_zarr_knows(tmp_path):
-    for map in fit_maps(("c",), lobes=2, ambient=True, channels=1):
-        write_metadata(tmp_path / map.name, map, 7, 9)
-        array = zarr.open_array(tmp_path / map.name, mode="r")
+    maps = fit_maps(("c",), lobes=2, ambient=True, channels=1)
+    stores.MapsWriter(tmp_path, GROUP, maps, 7, 9, {})
+    for map in maps:
+        array = zarr.open_array(tmp_path / GROUP / map.name, mode="r")
         assert array.shape == map.shape(7, 9)
         assert np.array_equal(array[...], np.full(array.shape, map.fill_value, map.dtype), equal_nan=True)

@@ -18,7 +18,15 @@ from impasto.colour import decode_srgb
 from impasto.errors import CaptureError, StoreError
 from impasto.stack import _decoders, stack
 from impasto.stack.linearise import Linearisation
-from store_files import attributes, contents, largest_file, noise_images, write_capture
+from store_files import (
+    attributes,
+    chunks_in,
+    contents,
+    largest_file,
+    noise_images,
+    photograph,
+    write_capture,
+)
 
 
 def values(path):
@@ -242,8 +250,9 @@ def test_overexposed_and_missing_photographs_have_all_of_their_chunks(tmp_path, 
     images = [np.full((30, 530, 3), value, dtype) for _ in range(2)]
     images[0][10, 10] = images[1][5, 520] = 0.25 if dtype == np.float32 else 80
     stack(write_capture(tmp_path / "photos", images), tmp_path / "s.zarr")
-    chunks = sorted((tmp_path / "s.zarr" / "stack" / "radiance" / "c").rglob("*/0/*/0"))
-    assert len(chunks) == 4
+    for light in (0, 1):
+        (first, size), (second, _) = chunks_in(photograph(tmp_path / "s.zarr", light), 2)
+        assert (first, second) == (0, size)
     read = stores.read_stack(tmp_path / "s.zarr", slice(0, 30), slice(0, 530))
     usual = read[1, 10, 10]
     np.testing.assert_array_equal(usual, np.nan if dtype == np.float32 else 1)
@@ -266,6 +275,19 @@ def test_fewer_photographs_are_decoded_at_a_time_where_memory_is_short(tmp_path,
     assert _decoders(pictures, linearise, 1.2e9) == 32
     assert _decoders(large, linearise, 1.2e9) in range(3, 9)
     assert _decoders(large, linearise, 0.2e9) == 1
+
+
+def test_an_unfinished_stack_of_another_layout_is_begun_anew(tmp_path):
+    folder = write_capture(tmp_path / "photos", noise_images(3, 300, 290))
+    stack(folder, tmp_path / "whole.zarr")
+    with largest_file(100_000), pytest.raises(StoreError, match="no room left"):
+        stack(folder, tmp_path / "s.zarr")
+    document = tmp_path / "s.zarr" / "stack" / "radiance" / "zarr.json"
+    metadata = json.loads(document.read_text())
+    metadata["codecs"] = metadata["codecs"][0]["configuration"]["codecs"]
+    document.write_text(json.dumps(metadata))
+    stack(folder, tmp_path / "s.zarr")
+    assert contents(tmp_path / "s.zarr") == contents(tmp_path / "whole.zarr")
 
 
 _CHILD = """

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto.store.published import SHARD, array_document
+from impasto.store.published import SHARD, packed_document
 
 Codes = NDArray[np.unsignedinteger]
 
@@ -58,7 +58,7 @@ class PackedArray:
 
     def document(self, *, shards: bool) -> dict[str, Any]:
         """Return the Zarr metadata of the array."""
-        return array_document(self.shape, self.chunk, self.dims, self.dtype, self.shard if shards else None)
+        return packed_document(self.shape, self.chunk, self.dims, self.dtype, self.shard if shards else None)
 
 
 def pixels_of(number: int, length: int, size: int) -> slice:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
+from io import BytesIO
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -45,7 +46,8 @@ from impasto.store.packing import (
     pack,
     parameter_columns,
 )
-from impasto.store.published import PUBLISHED_CHUNK, PUBLISHED_SCHEMA, encode_chunk, encode_shard
+from impasto.store.published import PUBLISHED_CHUNK, PUBLISHED_SCHEMA, encode_chunk
+from impasto.store.shards import put_shard
 
 _FIT_ATTRIBUTES = (
     "model",
@@ -173,10 +175,13 @@ class Publication:
                     for start, count, total in zip(first, per_shard, array.grid, strict=True)
                 )
             )
-            return encode_shard(
+            shard_file = BytesIO()
+            put_shard(
+                shard_file,
                 per_shard,
                 ((place, self.chunk(path, tuple(np.add(first, place).tolist()), SMALL)) for place in places),
             )
+            return shard_file.getvalue()
 
         counts = (-(-total // count) for total, count in zip(array.grid, per_shard, strict=True))
         for number in product(*(range(count) for count in counts)):

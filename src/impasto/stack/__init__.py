@@ -326,14 +326,15 @@ class _Job:
 
     def _light_colour(self, writer: stores.StackWriter) -> dict[str, Any]:
         """Return what the highlights of the photographs, all written, tell about the light."""
-        written = stores.read_group(writer.store / stores.STACK) or {}
         said = [
             *self.header.more["notes"],
             *dict.fromkeys(note for notes in self._notes.values() for note in notes),
         ]
         if (reference := self._corrections.light_colour()) is not None:
             return {**reference, "notes": said}
-        colour = light_colour(stores.Stack(writer.store, written), self._samples)
+        if not self._samples.whole:  # an earlier run wrote a part
+            self._samples.complete(stores.Stack(writer.store, writer.attributes))
+        colour = light_colour(self._samples, self.header)
         notes = [*said, *([colour.note] if colour.note else [])]
         return {"light_rgb": list(colour.rgb), "light_rgb_source": colour.source, "notes": notes}
 
@@ -387,18 +388,22 @@ class _Job:
         if writer.sha256[light] == sha256:
             advance(photograph.height)
             return True
-        writer.start_light(light)
         merged = len(self._exposures[light]) > 1
         bands = self._merged_bands(light) if merged else self._bands(light)
         if (shift := self._corrections.shift(photograph.name)) is not None:
             bands = self._shift(shift).bands((row, stored) for row, stored, _ in bands)
         clipped = 0
-        for row, stored, more in bands:
-            self._check_stop()
-            clipped += more
-            self._samples.take(light, row, stored)
-            writer.write_band(light, row, stored)
-            advance(len(stored))
+
+        def stored() -> Iterator[tuple[int, NDArray[Any]]]:
+            nonlocal clipped
+            for row, band, more in bands:
+                self._check_stop()
+                clipped += more
+                self._samples.take(light, row, band)
+                yield row, band
+                advance(len(band))
+
+        writer.write_light(light, stored())
         writer.finish_light(light, sha256, clipped)
         return False
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto import store as stores
 from impasto.stack.highlights import Array, Highlights, separate
 from impasto.stack.samples import Samples
+from impasto.store import ASSUMED_WHITE, StackHeader
 
 # Pixels whose diffuse colours differ by less than this (natural logarithm) count as one paint.
 _PAINT_WIDTH = 0.15
@@ -60,25 +60,20 @@ class LightColour:
     note: str
 
 
-def light_colour(stack: stores.Stack, samples: Samples | None = None) -> LightColour:
+def light_colour(samples: Samples, header: StackHeader) -> LightColour:
     """Estimate the colour of the light from the highlights of a stack.
 
     Parameters
     ----------
-    stack : Stack
-    samples : Samples, optional
-        What was taken of the photographs on their way into the stack; what is missing is read from it.
+    samples : Samples
+        What was taken of the photographs, all of it.
+    header : StackHeader
 
     Returns
     -------
     LightColour
         White where there is too little evidence, or where it does not contradict white. The same stack gives
         the same colour.
-
-    Raises
-    ------
-    StoreError
-        If the stack is damaged.
 
     Notes
     -----
@@ -88,12 +83,10 @@ def light_colour(stack: stores.Stack, samples: Samples | None = None) -> LightCo
     light's colour [Lee1986]_. Each paint has one vote in proportion to the square root of its pixels, the
     votes are combined by Tukey's biweight, and what one paint alone says does not suffice.
     """
-    channels = stack.shape[3]
+    channels = header.shape[3]
     if channels != 3:
-        return LightColour((1.0,) * channels, stores.ASSUMED_WHITE, "")
-    samples = samples or Samples(stack.shape, stack.dtype)
-    samples.complete(stack)
-    return from_highlights(_highlights(stack, samples))
+        return LightColour((1.0,) * channels, ASSUMED_WHITE, "")
+    return from_highlights(_highlights(samples, header))
 
 
 def from_highlights(highlights: Highlights) -> LightColour:
@@ -126,20 +119,22 @@ def from_highlights(highlights: Highlights) -> LightColour:
 
 def _white(reason: str) -> LightColour:
     note = f"the light is taken to be neutral in the photographs: {reason}"
-    return LightColour((1.0, 1.0, 1.0), stores.ASSUMED_WHITE, note)
+    return LightColour((1.0, 1.0, 1.0), ASSUMED_WHITE, note)
 
 
-def _highlights(stack: stores.Stack, samples: Samples) -> Highlights:
+def _highlights(samples: Samples, header: StackHeader) -> Highlights:
     """Separate the highlights of pixels all over the painting."""
-    radiance = samples.radiance(stack)
-    usable = np.isfinite(radiance) & (radiance < stack.clip_level)
-    radiance /= np.broadcast_to(stack.lights.intensity, radiance.shape[1:])
-    return separate(radiance, np.all(usable, axis=-1), _light_vectors(stack, samples), stack.noise[0])
+    radiance = samples.values * header.scale + header.offset
+    clip_level = [math.inf if level is None else level for level in header.clip_level]
+    usable = np.isfinite(radiance) & (radiance < clip_level)
+    radiance /= np.broadcast_to(header.lights.intensity, radiance.shape[1:])
+    lights = _light_vectors(samples, header)
+    return separate(radiance, np.all(usable, axis=-1), lights, header.noise["read"])
 
 
-def _light_vectors(stack: stores.Stack, samples: Samples) -> Array:
+def _light_vectors(samples: Samples, header: StackHeader) -> Array:
     """Return direction times relative irradiance of each light, shape (N or 1, L, 3)."""
-    lights, mm_per_px = stack.lights, stack.camera.mm_per_px
+    lights, mm_per_px = header.lights, header.camera.mm_per_px
     direction = lights.direction[np.newaxis]
     if not lights.near or mm_per_px is None:
         return direction

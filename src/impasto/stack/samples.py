@@ -61,6 +61,11 @@ class Samples:
                 self._values[light, self._parts[number]] = taken.reshape(-1, band.shape[-1])
                 self._taken[light, number] = True
 
+    @property
+    def whole(self) -> bool:
+        """Whether all photographs were taken."""
+        return bool(self._taken.all())
+
     def complete(self, stack: stores.Stack) -> None:
         """Read from a stack what was not taken on the way into it.
 
@@ -76,9 +81,10 @@ class Samples:
                 self._values[light, self._parts[number]] = taken.reshape(-1, values.shape[-1])
         self._taken[:] = True
 
-    def radiance(self, stack: stores.Stack) -> NDArray[np.float64]:
-        """Return relative radiance, shape (N, L, C)."""
-        return self._values.swapaxes(0, 1) * np.float64(stack.scale) + stack.offset
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """Values as stored, shape (N, L, C)."""
+        return self._values.swapaxes(0, 1).astype(np.float64, order="C")
 
     def position_mm(self, mm_per_px: float) -> NDArray[np.float32]:
         """Return where the pixels lie on the painting, shape (N, 2)."""

@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto.store.files import reading, writing
+from impasto.store.files import reading
 from impasto.store.hierarchy import (
     Attributes,
-    create_renderings_array,
     lost_pieces,
     open_array,
     provenance,
     read_group,
     remove,
     write_group,
+    write_table,
 )
 from impasto.store.layout import EVALUATIONS
 
@@ -80,10 +80,9 @@ def write_evaluation(
     remove(store, group)
     if read_group(store / EVALUATIONS) is None:
         write_group(store, EVALUATIONS, {})
-    shape = (radiance.shape[0], radiance.shape[1], radiance.shape[2], radiance.shape[3])
-    array = create_renderings_array(store, f"{group}/{_ARRAY}", shape)
-    with writing(store, f"{group}/{_ARRAY}"):
-        array[...] = radiance
+    dims = ("light", "y", "x", "channel")
+    said = {"long_name": "relative radiance as rendered", "units": "1"}
+    write_table(store, f"{group}/{_ARRAY}", radiance, dims, said, rows=1)
     write_group(store, group, {**provenance(), "model": model, **_strict(attributes), "complete": True})
 
 

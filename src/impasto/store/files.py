@@ -12,14 +12,14 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from impasto.errors import Problem, StoreError
 
 # EFBIG is what a limit on the size of files (ulimit -f) gives.
 _NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
-# Names of files being written: by `write_whole` with a process number, by zarr-python with a UUID.
+# Names of files being written: by `whole_file` with a process number, by zarr-python with a UUID.
 _PARTIAL = re.compile(r".+\.(\d+|[0-9a-f]{32})\.partial")
 
 # What decoders raise on a chunk with a wrong checksum, cut off, or empty.
@@ -42,13 +42,20 @@ def write_json(path: Path, value: Mapping[str, Any]) -> None:
 
 def write_whole(path: Path, *parts: bytes) -> None:
     """Write `parts`, one after the other; a kill leaves the old file or the new one, never a part of it."""
+    with whole_file(path) as file:
+        file.writelines(parts)
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[BinaryIO]:
+    """Yield a file to write, which takes the place of what is at `path` when the block ends without error."""
     temporary = path.with_name(f"{path.name}.{os.getpid()}.partial")
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         with temporary.open("wb") as file:
-            file.writelines(parts)
+            yield file
         os.replace(temporary, path)
-    except OSError:
+    except BaseException:
         temporary.unlink(missing_ok=True)
         raise
 

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.errors import Problem, StoreError
+from impasto.store.arrays import array_document
+from impasto.store.chunks import encode_chunks
 from impasto.store.files import DAMAGE, reading, writing
 from impasto.store.hierarchy import (
     Attributes,
@@ -24,10 +26,21 @@ from impasto.store.hierarchy import (
     read_group,
     remove,
     source_problems,
+    write_array_metadata,
     write_group,
 )
-from impasto.store.layout import FITS, PYRAMIDS, Map, Unit, status_counts, units
-from impasto.store.shards import write_metadata, write_shard
+from impasto.store.layout import (
+    FITS,
+    INNER_CHUNK,
+    PYRAMIDS,
+    UNIT,
+    ZSTD,
+    Map,
+    Unit,
+    status_counts,
+    units,
+)
+from impasto.store.shards import write_shard
 
 if TYPE_CHECKING:
     import zarr
@@ -78,8 +91,7 @@ class MapsWriter:
             write_group(store, group, {**self._attributes, "complete": False})
         for map in maps:
             if not has_array(store, f"{group}/{map.name}"):
-                with writing(store, f"{group}/{map.name}"):
-                    write_metadata(store / group / map.name, map, height, width)
+                write_array_metadata(store, f"{group}/{map.name}", _document(map, height, width))
 
     @cached_property
     def _status(self) -> zarr.Array[Any]:
@@ -132,7 +144,9 @@ class MapsWriter:
     def write_map(self, unit: Unit, map: Map, values: NDArray[Any]) -> None:
         """Write one map of a unit; the caller sees to it that ``status`` is the last."""
         with writing(self.store, f"{self.group}/{map.name}"):
-            write_shard(self._shard(map, unit), map, values)
+            across = UNIT // INNER_CHUNK
+            chunks = encode_chunks(np.asarray(values, map.dtype), INNER_CHUNK, map.fill_value)
+            write_shard(self._shard(map, unit), (across, across), chunks)
 
     def status_counts(self) -> NDArray[np.int64]:
         """Return how many pixels have each status, as an ndarray of shape (256,), int64."""
@@ -145,6 +159,21 @@ class MapsWriter:
         """Declare the group complete, and add attributes that were not known before."""
         self._attributes.update(more)
         write_group(self.store, self.group, {**self._attributes, "complete": True})
+
+
+def _document(map: Map, height: int, width: int) -> dict[str, Any]:
+    """Return the metadata of the array of a map, for an image of `height` x `width` pixels."""
+    last = () if map.axis is None else (map.size,)
+    return array_document(
+        map.shape(height, width),
+        (INNER_CHUNK, INNER_CHUNK, *last),
+        map.dims,
+        map.dtype,
+        fill_value=map.fill_value,
+        compressor=("zstd", ZSTD),
+        shard=(UNIT, UNIT, *last),
+        attributes={"long_name": map.long_name, "units": map.units},
+    )
 
 
 def fit_attributes(store: str | Path, model: str) -> Attributes | None:

@@ -1,8 +1,8 @@
 """Groups and arrays of a store's Zarr v3 hierarchy.
 
-Groups are small JSON documents, written here directly and atomically. Arrays are read through zarr-python
-with the `zarrs` codec pipeline; large ones are written by `chunks` and `shards`. zarr takes a sixth of a
-second to import, so that happens where an array is touched.
+Metadata are small JSON documents, written here directly and atomically, and so are small arrays; large ones
+are written by `chunks` and `shards`. Arrays are read through zarr-python with the `zarrs` codec pipeline.
+zarr takes a sixth of a second to import, so that happens where an array is read.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.errors import Problem, StoreError
-from impasto.store.files import is_partial, write_json, writing
-from impasto.store.layout import FITS, PYRAMIDS, SCHEMA, STACK, STACK_CHUNK, ZSTD, stack_fill_value
+from impasto.store.arrays import array_document
+from impasto.store.files import is_partial, write_json, write_whole, writing
+from impasto.store.layout import FITS, PYRAMIDS, SCHEMA, ZSTD
 
 if TYPE_CHECKING:
     import zarr
@@ -149,73 +150,58 @@ def remove(store: Path, *paths: str) -> None:
             shutil.rmtree(store / path)
 
 
-def create_stack_array(
-    store: Path,
-    shape: tuple[int, int, int, int],
-    dtype: np.dtype,
-    attributes: Attributes,
-    zstd: Mapping[str, Any],
-) -> None:
-    """Create ``stack/radiance`` for `shape` (light, y, x, channel), compressed by `zstd`."""
-    _create(
-        store,
-        f"{STACK}/radiance",
-        shape=shape,
-        dtype=dtype,
-        dimension_names=("light", "y", "x", "channel"),
-        chunks=(1, STACK_CHUNK, STACK_CHUNK, shape[3]),
-        fill_value=stack_fill_value(dtype),
-        attributes=attributes,
-        zstd=zstd,
-    )
+def write_array_metadata(store: Path, path: str, document: Mapping[str, Any]) -> None:
+    """Write the metadata of an array, as `array_document` makes it, whole or not at all."""
+    with writing(store, f"{path}/zarr.json"):
+        write_json(store / path / "zarr.json", document)
+
+
+def read_array_metadata(store: Path, path: str) -> Attributes | None:
+    """Return the metadata of an array as they stand, or None where they cannot be read."""
+    try:
+        found: Attributes = json.loads((store / path / "zarr.json").read_text(encoding="utf-8"))
+        return found
+    except (OSError, ValueError):
+        return None
 
 
 def write_table(
     store: Path,
     path: str,
-    values: NDArray[np.float64] | Sequence[str],
+    values: NDArray[np.number] | Sequence[str],
     dims: tuple[str, ...],
     attributes: Attributes,
+    *,
+    rows: int | None = None,
 ) -> None:
-    """Write a small array in one chunk: numbers as float64, names as strings of variable length."""
+    """Write an array as a whole, in chunks of `rows` along its first axis, by default in one.
+
+    Strings are those of variable length; `rows` divides the length of numbers.
+    """
+    from numcodecs.vlen import VLenUTF8
+    from numcodecs.zstd import Zstd
+
     names = not isinstance(values, np.ndarray)
-    data = np.array(values, dtype=object) if names else np.ascontiguousarray(values, np.float64)
-    array = _create(
-        store,
-        path,
-        shape=data.shape,
-        dtype=str if names else np.dtype(np.float64),
-        dimension_names=dims,
-        chunks=data.shape,
+    data = np.array(values, object) if names else np.ascontiguousarray(values)
+    rows = rows or len(data)
+    document = array_document(
+        data.shape,
+        (rows, *data.shape[1:]),
+        dims,
+        str if names else data.dtype,
         fill_value="" if names else float("nan"),
+        compressor=("zstd", ZSTD),
         attributes=attributes,
     )
+    write_array_metadata(store, path, document)
+    compressor = Zstd(**ZSTD)
+    ending = "/0" * (data.ndim - 1)
     with writing(store, path):
-        array[...] = data
-
-
-def create_renderings_array(store: Path, path: str, shape: tuple[int, int, int, int]) -> zarr.Array[Any]:
-    """Create an array of float32 renderings for `shape` (light, y, x, channel), a light per chunk."""
-    return _create(
-        store,
-        path,
-        shape=shape,
-        dtype=np.dtype(np.float32),
-        dimension_names=("light", "y", "x", "channel"),
-        chunks=(1, *shape[1:]),
-        fill_value=float("nan"),
-        attributes={"long_name": "relative radiance as rendered", "units": "1"},
-    )
-
-
-def _create(store: Path, path: str, *, zstd: Mapping[str, Any] = ZSTD, **arguments: Any) -> zarr.Array[Any]:
-    import zarr
-    from zarr.codecs import ZstdCodec
-
-    with writing(store, path), _pipeline():
-        return zarr.create_array(
-            store, name=path, zarr_format=3, overwrite=True, compressors=[ZstdCodec(**zstd)], **arguments
-        )
+        for number in range(0, len(data), rows):
+            part = data[number : number + rows]
+            little_endian = part.dtype.newbyteorder("<")
+            chunk = VLenUTF8().encode(part) if names else part.astype(little_endian, copy=False)
+            write_whole(store / path / f"c/{number // rows}{ending}", compressor.encode(chunk))
 
 
 def open_array(store: Path, path: str) -> zarr.Array[Any]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from impasto.errors import Problem, StoreError
 from impasto.geometry import Camera
+from impasto.store.arrays import array_document
 from impasto.store.files import reading
 from impasto.store.fits import Fit, Maps
 from impasto.store.hierarchy import Attributes, lost_pieces, open_array, read_group
@@ -31,11 +32,10 @@ PUBLISHED_CHUNK = 512
 PHOTOGRAPH_CHUNK = 256
 SHARD = 4096
 
-_NONE = 2**64 - 1  # what the index of a shard says of a chunk that is not there
 _AGAIN = "Publish the painting again"
 
 
-def array_document(
+def packed_document(
     shape: Sequence[int],
     chunk: Sequence[int],
     dims: Sequence[str],
@@ -43,30 +43,9 @@ def array_document(
     shard: Sequence[int] | None,
 ) -> dict[str, Any]:
     """Return the Zarr metadata of a packed array, ``uint16`` or ``uint8``; 0 says that there is no value."""
-    little_endian = {"name": "bytes", "configuration": {"endian": "little"}}
     # Browsers decode gzip themselves, and check its CRC.
-    codecs: list[dict[str, Any]] = [little_endian, {"name": "gzip", "configuration": {"level": 6}}]
-    if shard:
-        sharding = {
-            "chunk_shape": list(chunk),
-            "codecs": codecs,
-            "index_codecs": [little_endian, {"name": "crc32c"}],
-            "index_location": "end",
-        }
-        codecs = [{"name": "sharding_indexed", "configuration": sharding}]
-    return {
-        "zarr_format": 3,
-        "node_type": "array",
-        "shape": list(shape),
-        "data_type": dtype,
-        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": list(shard or chunk)}},
-        "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
-        "fill_value": 0,
-        "codecs": codecs,
-        "attributes": {},
-        "dimension_names": list(dims),
-        "storage_transformers": [],
-    }
+    gzip = ("gzip", {"level": 6})
+    return array_document(shape, chunk, dims, dtype, fill_value=0, compressor=gzip, shard=shard)
 
 
 def encode_chunk(values: NDArray[np.unsignedinteger], shape: Sequence[int], dtype: str, level: int) -> bytes:
@@ -77,20 +56,6 @@ def encode_chunk(values: NDArray[np.unsignedinteger], shape: Sequence[int], dtyp
     chunk = np.zeros(shape, np.dtype(dtype).newbyteorder("<"))
     chunk[tuple(slice(length) for length in values.shape)] = values
     return gzip.compress(chunk.tobytes(), compresslevel=level, mtime=0)
-
-
-def encode_shard(grid: Sequence[int], chunks: Iterable[tuple[tuple[int, ...], bytes]]) -> bytes:
-    """Return a shard of `grid` chunks, of which some may be absent, by their place in it."""
-    import google_crc32c
-
-    index = np.full((*grid, 2), _NONE, "<u8")
-    data = bytearray()
-    for place, chunk in chunks:
-        index[place] = len(data), len(chunk)
-        data += chunk
-    data += index.tobytes()
-    checksum: int = google_crc32c.value(index.tobytes())
-    return bytes(data) + checksum.to_bytes(4, "little")
 
 
 @dataclass(frozen=True)

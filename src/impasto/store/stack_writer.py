@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,14 +13,16 @@ from numpy.typing import NDArray
 
 from impasto.errors import Problem, StoreError
 from impasto.geometry import Camera, Lights
+from impasto.store.arrays import array_document
 from impasto.store.chunks import encode_chunks
-from impasto.store.files import digest, write_whole, writing
+from impasto.store.files import digest, writing
 from impasto.store.hierarchy import (
     Attributes,
-    create_stack_array,
     provenance,
+    read_array_metadata,
     read_group,
     remove,
+    write_array_metadata,
     write_group,
     write_table,
 )
@@ -36,6 +37,9 @@ from impasto.store.layout import (
     ZSTD_NOISE,
     stack_fill_value,
 )
+from impasto.store.shards import write_shard
+
+_RADIANCE = f"{STACK}/radiance"
 
 _TABLES: dict[str, tuple[tuple[str, ...], Attributes]] = {
     "light_name": (("light",), {"long_name": "name of the photograph"}),
@@ -138,8 +142,8 @@ def _as_json(values: NDArray[np.float64] | tuple[str, ...]) -> Any:
 class StackWriter:
     """Writes a stack photograph by photograph, and remembers which are whole.
 
-    A photograph counts as whole when its SHA-256 stands in the metadata, which happens after its last chunk
-    is written. Methods may be called from several threads, each with its own photograph.
+    A photograph is one shard, there as a whole or not at all; it counts when its SHA-256 stands in the
+    metadata. Methods may be called from several threads, each with its own photograph.
 
     Parameters
     ----------
@@ -153,6 +157,18 @@ class StackWriter:
         self.store = store
         self._header = header
         self._zstd = ZSTD if header.inputs[0].get("dtype") == "uint8" else ZSTD_NOISE
+        _, height, width, channels = header.shape
+        self._grid = (1, -(-height // STACK_CHUNK), -(-width // STACK_CHUNK), 1)
+        self._document = array_document(
+            header.shape,
+            (1, STACK_CHUNK, STACK_CHUNK, channels),
+            ("light", "y", "x", "channel"),
+            header.dtype,
+            fill_value=stack_fill_value(header.dtype),
+            compressor=("zstd", self._zstd),
+            shard=(1, self._grid[1] * STACK_CHUNK, self._grid[2] * STACK_CHUNK, channels),
+            attributes={"long_name": "relative radiance, as scale * value + offset", "units": "1"},
+        )
         self._writing = threading.Lock()
         self._attributes = self._begin({**provenance(), **header.attributes()}, fresh)
 
@@ -162,19 +178,18 @@ class StackWriter:
         if read_group(store) is None:
             write_group(store, "", {"impasto_schema": SCHEMA, **provenance()})
         found = read_group(store / STACK)
-        if found is not None and not fresh and all(found.get(key) == settings[key] for key in settings):
+        if (
+            found is not None
+            and not fresh
+            and all(found.get(key) == settings[key] for key in settings)
+            and read_array_metadata(store, _RADIANCE) == self._document
+        ):
             return found
         remove(store, EVALUATIONS, FITS, PYRAMIDS, STACK)
-        create_stack_array(
-            store,
-            self._header.shape,
-            self._header.dtype,
-            {"long_name": "relative radiance, as scale * value + offset", "units": "1"},
-            self._zstd,
-        )
+        write_array_metadata(store, _RADIANCE, self._document)
         for name, values in self._header.tables().items():
             dims, attributes = _TABLES[name]
-            write_table(store, f"{STACK}/{name}", _owned(values), dims, attributes)
+            write_table(store, f"{STACK}/{name}", values, dims, attributes)
         # Without the group's own metadata the arrays above do not count, so it comes last.
         begun = {
             "coordinates": " ".join(_TABLES),
@@ -186,33 +201,41 @@ class StackWriter:
         return begun
 
     @property
+    def attributes(self) -> Attributes:
+        """The attributes of the group as they stand in the store."""
+        return self._attributes
+
+    @property
     def sha256(self) -> list[str | None]:
         """SHA-256 per photograph, None for those that are not written whole."""
         return [entry["sha256"] for entry in self._attributes["inputs"]]
 
-    def start_light(self, light: int) -> None:
-        """Forget what there is of a photograph, whole or in part."""
-        self._record(light, None, None)
-        folder = self.store / STACK / "radiance" / "c" / str(light)
-        if folder.exists():
-            shutil.rmtree(folder)
-
-    def write_band(self, light: int, row: int, band: NDArray[Any]) -> None:
-        """Write rows of a photograph.
+    def write_light(self, light: int, bands: Iterable[tuple[int, NDArray[Any]]]) -> None:
+        """Write a photograph, in place of what there is of it.
 
         Parameters
         ----------
         light : int
-        row : int
-            The first row; a multiple of the chunk's height, so that no chunk is written twice.
-        band : ndarray of shape (rows, W, C)
-            Values as stored; no more rows than a chunk has.
+        bands : iterable
+            First row and values of each band, shape (rows, W, C), as stored, from top to bottom; a band is
+            one row of chunks, or several.
+
+        Raises
+        ------
+        StoreError
+            If the disk is full or refuses.
         """
-        folder = self.store / STACK / "radiance" / "c" / str(light)
-        fill_value = stack_fill_value(band.dtype)
-        with writing(self.store, f"{STACK}/radiance"):
-            for (_, column), chunk in encode_chunks(band, STACK_CHUNK, fill_value, self._zstd):
-                write_whole(folder / str(row // STACK_CHUNK) / str(column) / "0", chunk)
+        self._record(light, None, None)
+
+        def chunks() -> Iterator[tuple[tuple[int, ...], bytes]]:
+            for first, band in bands:
+                for (row, column), chunk in encode_chunks(
+                    band, STACK_CHUNK, stack_fill_value(band.dtype), self._zstd
+                ):
+                    yield (0, first // STACK_CHUNK + row, column, 0), chunk
+
+        with writing(self.store, _RADIANCE):
+            write_shard(self.store / _RADIANCE / f"c/{light}/0/0/0", self._grid, chunks())
 
     def finish_light(self, light: int, sha256: str, clipped_samples: int) -> None:
         """Record that a photograph is written whole."""
@@ -239,10 +262,6 @@ class StackWriter:
         self._attributes.update(more)
         self._attributes["complete"] = True
         write_group(self.store, STACK, self._attributes)
-
-
-def _owned(values: NDArray[np.float64] | tuple[str, ...]) -> NDArray[np.float64] | tuple[str, ...]:
-    return values if isinstance(values, tuple) else np.array(values)
 
 
 def unfinished_stack(store: Path, attributes: Attributes) -> Problem:
