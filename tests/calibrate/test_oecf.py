@@ -107,6 +107,16 @@ def test_exposures_extend_the_range(folder, tmp_path):
     assert any("taken from the others" in note for note in found.notes)
 
 
+def test_patches_that_read_the_same_count_as_one(folder, tmp_path):
+    """As in several exposures; here it is the same photograph twice."""
+    photo, table = (folder / "tone" / name for name in ("grey_scale.tif", "grey_scale.csv"))
+    card, dark = (folder / "tone" / name for name in ("grey_scale_card.tif", "dark.tif"))
+    twice = impasto.calibrate.oecf(
+        [photo, photo], table, tmp_path / "o.json", card=card, dark=dark, exposures_s=[1, 1]
+    )
+    assert errors(twice, "tone").max() < 0.003
+
+
 def test_all_that_is_wrong_is_listed(folder, tmp_path):
     table = (folder / "tone" / "grey_scale.csv").read_text().splitlines()
     cells = table[3].split(",")

@@ -17,6 +17,9 @@ _NODES = 512
 _SMOOTHING = 0.15
 # Nobody knows the reflectances of a target better than this.
 _LEAST_SD = 3e-4
+# Patches whose codes above black differ by less than this share, as those of several exposures may, count as
+# one: a spline through both would follow their noise.
+_SAME = 0.005
 
 
 @dataclass(frozen=True)
@@ -112,10 +115,9 @@ def fit_response(code: Array, sd: Array, radiance: Array, black: Array, largest:
     nodes, values, measured = [], [], []
     for channel in range(channels):
         order = np.argsort(code[:, channel])
-        x = np.log(code[order, channel] - black[channel])
-        y = np.log(radiance[order, channel])
+        above = code[order, channel] - black[channel]
+        x, y, relative = _merged(np.log(above), np.log(radiance[order, channel]), sd[order, channel] / above)
         slope = np.maximum(np.gradient(y, x), 0.1) if len(x) > 2 else np.ones(len(x))
-        relative = sd[order, channel] / (code[order, channel] - black[channel])
         weight = 1 / np.hypot(relative * slope, _LEAST_SD)
         with warnings.catch_warnings():
             # Few patches with much noise cannot be followed that closely, and then are by less.
@@ -134,3 +136,10 @@ def fit_response(code: Array, sd: Array, radiance: Array, black: Array, largest:
         values.append(np.exp(level - level[-1]))
         measured.append(np.exp(x[[0, -1]]) + black[channel])
     return Response(black, np.array(nodes), np.array(values), np.array(measured))
+
+
+def _merged(x: Array, y: Array, sd: Array) -> tuple[Array, Array, Array]:
+    """Return the means of runs of ascending x that lie closely together, with the standard deviation of x."""
+    run = np.concatenate([[0], np.cumsum(np.diff(x) > _SAME)])
+    count = np.bincount(run)
+    return np.bincount(run, x) / count, np.bincount(run, y) / count, np.sqrt(np.bincount(run, sd**2)) / count
