@@ -91,13 +91,13 @@ def subject_of(
     iso, f_number, size : bool
         Whether another ISO, aperture or size makes it useless. Another camera always does.
     """
-    height, width, channels = shots[0].codes.shape
+    first = shots[0].photograph
     return Subject(
         camera=common(shots, lambda photograph: photograph.camera),
         iso=common(shots, lambda photograph: photograph.iso) if iso else None,
         f_number=common(shots, lambda photograph: photograph.f_number) if f_number else None,
-        size=(width, height) if size else None,
-        channels=channels,
+        size=(first.width, first.height) if size else None,
+        channels=first.channels,
     )
 
 

@@ -100,7 +100,7 @@ def flat(
         if not seen:
             table = response_table(oecf, [shot])
             black = dark_image(dark, [shot], table)
-        seen.append(shot.without_pixels if seen else shot)
+        seen.append(shot.without_pixels)
         image = shot.linear(table) - black
         problems += _card_problems(shot, image)
         surface, residual = smooth_surface(image)

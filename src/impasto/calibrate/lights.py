@@ -8,12 +8,21 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from impasto.calibrate.files import write_calibration
-from impasto.calibrate.mirror import Rays, Reflection, Sphere, find_reflection, given_sphere, locate_sphere
+from impasto.calibrate.mirror import (
+    Rays,
+    Reflection,
+    Sphere,
+    find_reflection,
+    given_sphere,
+    locate_sphere,
+    sphere_window,
+)
 from impasto.calibrate.outline import circle_problem, find_circles, outline_points
-from impasto.calibrate.shots import Shot, box_mean, box_problems, photographs_in, read_shots
-from impasto.calibrate.sphere_picture import draw_spheres
+from impasto.calibrate.shots import Shot, box_problems, one_by_one, photographs_in
+from impasto.calibrate.sphere_picture import draw_spheres, thinned
 from impasto.calibrate.triangulate import Placed, place_light
 from impasto.capture.light_files import read_camera
 from impasto.capture.manifest import light_positions, manifest
@@ -122,33 +131,29 @@ def lights(
     The spheres rest on the plane of the painting. Directions are those from the painting's centre, which is
     the centre of the image; without positions, they are the mean over the spheres.
     """
-    shots = read_shots(photographs_in(Path(photos), exclude))
-    shape = shots[0].codes.shape
+    paths = photographs_in(Path(photos), exclude)
     dropped = tuple(dict.fromkeys(drop))
-    problems = [
-        Problem(f"--drop {name}", "is none of the photographs", "Correct the name")
-        for name in dropped
-        if name not in {shot.name for shot in shots}
-    ]
-    problems += [
-        Problem(f"--sphere {column:g},{row:g},{radius:g}", told, "Give column, row and radius in pixels")
-        for column, row, radius in spheres
-        if (told := circle_problem((column, row, radius), shape))
-    ]
-    if intensity not in INTENSITIES:
-        what = "is not known"
-        problems.append(Problem(f"--intensity {intensity}", what, f"Choose {', '.join(INTENSITIES)}"))
-    if (intensity == "card") != (card is not None):
-        do = "Give both --intensity card and --card COLUMN,ROW,COLUMN,ROW, or neither"
-        problems.append(Problem("--card", "and --intensity card belong together", do))
-    if card is not None:
-        problems += box_problems(card, shape, "--card")
-    raise_problems(OptionError, problems)
+    problems = _option_problems(dropped, paths, intensity, card)
     viewed = _camera(camera, mm_per_px)
-    images = np.stack([shot.linear().mean(axis=2, dtype=np.float64) for shot in shots])
-    found, rays = _find_spheres(images.mean(axis=0), spheres, count, viewed, radius_mm)
+    shots: list[Shot] = []
+    mean = brightest = np.zeros((1, 1))
+    # One photograph at a time is in memory, and all are read twice: the spheres are found in their mean.
+    for shot in one_by_one(paths):
+        level = shot.luminance()
+        if not shots:
+            raise_problems(OptionError, problems + _place_problems(spheres, card, level.shape))
+            mean = np.zeros(level.shape)
+            brightest = np.zeros(thinned(level).shape)
+        mean += level
+        np.maximum(brightest, thinned(level), out=brightest)
+        shots.append(shot.without_pixels)
+    mean /= len(shots)
+    size = mean.shape
+    found, rays = _find_spheres(mean, spheres, count, viewed, radius_mm)
+    del mean
     kept = [row for row, shot in enumerate(shots) if shot.name not in dropped]
-    seen = _reflections(shots, images, kept, found, rays)
+    windows, on_card = _cut_out(paths, found, card, rays)
+    seen = _reflections(paths, windows, kept, found, rays)
     placed, notes = _place([seen[row] for row in kept], rays)
     names = tuple(shots[row].name for row in kept)
     result = Lights(
@@ -156,7 +161,12 @@ def lights(
         np.array([one.direction for one in placed]),
         np.array([one.position_mm for one in placed]),
     )
-    gains = _gains(intensity, card, [shots[row] for row in kept], [seen[row] for row in kept], result, rays)
+    if intensity == "card" and card is not None:
+        gains = _gains_on_card([on_card[row] for row in kept], card, result, rays)
+    elif intensity == "spheres":
+        gains = _gains_in_spheres([shots[row] for row in kept], [seen[row] for row in kept], result)
+    else:
+        gains = np.ones((len(kept), 1))
     result = Lights(names, result.direction, result.position_mm, gains)
     disagreement = np.array([one.disagreement_deg for one in placed])
     doubtful = tuple(names[row] for row in _doubtful(disagreement))
@@ -164,9 +174,7 @@ def lights(
     files = [shots[row].path.name for row in kept]
     write_text(folder / "lights.lp", light_positions(files, result))
     write_text(folder / MANIFEST, manifest(files, result, rays.camera))
-    draw_spheres(
-        folder / "spheres.png", images.max(axis=0), found, [seen[row] for row in kept], names, doubtful
-    )
+    draw_spheres(folder / "spheres.png", brightest, size, found, [seen[row] for row in kept], names, doubtful)
     summary = LightsCalibration(
         folder=folder,
         names=names,
@@ -182,6 +190,34 @@ def lights(
         folder / "lights.json", "lights", _record(summary), made_from=[shot.provenance for shot in shots]
     )
     return summary
+
+
+def _option_problems(
+    dropped: Sequence[str], paths: Sequence[Path], intensity: str, card: Sequence[int] | None
+) -> list[Problem]:
+    problems = [
+        Problem(f"--drop {name}", "is none of the photographs", "Correct the name")
+        for name in dropped
+        if name not in {path.stem for path in paths}
+    ]
+    if intensity not in INTENSITIES:
+        what = "is not known"
+        problems.append(Problem(f"--intensity {intensity}", what, f"Choose {', '.join(INTENSITIES)}"))
+    if (intensity == "card") != (card is not None):
+        do = "Give both --intensity card and --card COLUMN,ROW,COLUMN,ROW, or neither"
+        problems.append(Problem("--card", "and --intensity card belong together", do))
+    return problems
+
+
+def _place_problems(
+    spheres: Sequence[Sequence[float]], card: Sequence[int] | None, shape: Sequence[int]
+) -> list[Problem]:
+    problems = [
+        Problem(f"--sphere {column:g},{row:g},{radius:g}", told, "Give column, row and radius in pixels")
+        for column, row, radius in spheres
+        if (told := circle_problem((column, row, radius), shape))
+    ]
+    return problems if card is None else problems + box_problems(card, shape, "--card")
 
 
 def _camera(camera: Camera | str | PathLike[str] | None, mm_per_px: float | None) -> Camera:
@@ -226,26 +262,68 @@ def _find_spheres(
     return found, rays
 
 
+@dataclass(frozen=True)
+class _Window:
+    """What all photographs show of one sphere, shape (L, rows, columns): float32 luminance, and clipped."""
+
+    level: NDArray[np.float32]
+    clipped: NDArray[np.bool_]
+
+    def background(self) -> NDArray[np.float32]:
+        """Return what is seen whatever lamp is lit, shape (rows, columns)."""
+        if len(self.level) < 2:
+            return np.zeros_like(self.level[0])
+        if len(self.level) == 2:
+            return np.asarray(self.level.min(axis=0))
+        # Row by row, because a median copies what it is of.
+        return np.stack([np.median(self.level[:, row], axis=0) for row in range(self.level.shape[1])])
+
+
+def _cut_out(
+    paths: Sequence[Path], spheres: Sequence[Sphere], card: Sequence[int] | None, rays: Rays
+) -> tuple[list[_Window], list[Shot]]:
+    """Return what all photographs show of each sphere, and of the card if there is one."""
+    places = [sphere_window(sphere, rays.height, rays.width) for sphere in spheres]
+    windows = []
+    for rows, columns in places:
+        shape = (len(paths), rows.stop - rows.start, columns.stop - columns.start)
+        windows.append(_Window(np.empty(shape, np.float32), np.empty(shape, bool)))
+    on_card = []
+    for light, shot in enumerate(one_by_one(paths)):
+        for window, place in zip(windows, places, strict=True):
+            part = shot.part(place)
+            window.level[light] = part.luminance()
+            window.clipped[light] = part.clipped.any(axis=2)
+        if card is not None:
+            left, top, right, bottom = card
+            on_card.append(shot.part((slice(top, bottom), slice(left, right))))
+    return windows, on_card
+
+
 def _reflections(
-    shots: Sequence[Shot], images: Array, kept: Sequence[int], spheres: list[Sphere], rays: Rays
+    paths: Sequence[Path],
+    windows: Sequence[_Window],
+    kept: Sequence[int],
+    spheres: Sequence[Sphere],
+    rays: Rays,
 ) -> dict[int, list[Reflection | None]]:
     """Return each light's reflection in each sphere."""
-    background = np.median(images, axis=0) if len(images) > 2 else images.min(axis=0)
-    if len(images) < 2:
-        background = np.zeros_like(background)
-    seen = {}
-    problems = []
-    for row in kept:
-        clipped = np.any(shots[row].clipped, axis=2)
-        seen[row] = [find_reflection(images[row], background, clipped, sphere, rays) for sphere in spheres]
-        if not any(seen[row]):
-            problems.append(
-                Problem(
-                    shots[row].path.name,
-                    "shows its lamp in no sphere",
-                    f"Leave it out with --drop {shots[row].name}, or correct the circles with --sphere",
-                )
+    seen: dict[int, list[Reflection | None]] = {row: [] for row in kept}
+    for window, sphere in zip(windows, spheres, strict=True):
+        background = window.background()
+        for row in kept:
+            seen[row].append(
+                find_reflection(window.level[row], background, window.clipped[row], sphere, rays)
             )
+    problems = [
+        Problem(
+            paths[row].name,
+            "shows its lamp in no sphere",
+            f"Leave it out with --drop {paths[row].stem}, or correct the circles with --sphere",
+        )
+        for row in kept
+        if not any(seen[row])
+    ]
     raise_problems(CaptureError, problems)
     return seen
 
@@ -278,47 +356,46 @@ def _doubtful(disagreement_deg: Array) -> list[int]:
     return np.flatnonzero(disagreement_deg > max(_OUTLYING * usual, _DOUBTFUL_DEG)).tolist()
 
 
-def _gains(
-    intensity: str,
-    card: Sequence[int] | None,
-    shots: Sequence[Shot],
-    seen: Sequence[list[Reflection | None]],
-    lights: Lights,
-    rays: Rays,
+def _gains_in_spheres(
+    shots: Sequence[Shot], seen: Sequence[list[Reflection | None]], lights: Lights
 ) -> Array:
-    """Return each light's relative irradiance at the centre of the painting, of mean 1, shape (L, 1 or C)."""
-    if intensity == "equal":
-        return np.ones((len(shots), 1))
-    if intensity == "spheres":
-        what = "shows its lamp clipped, so that its intensity cannot be told"
-        do = "Expose the spheres for less time, or take the intensities from a card with --card"
-        raise_problems(
-            CaptureError,
-            [
-                Problem(shot.path.name, what, do)
-                for shot, views in zip(shots, seen, strict=True)
-                if any(view is not None and view.clipped for view in views)
-            ],
-        )
-        gains = np.array([
-            [np.mean([v.irradiance * _to_centre(v.point, lights, row) for v in views if v is not None])]
-            for row, views in enumerate(seen)
-        ])  # fmt: skip
-        return np.asarray(gains / gains.mean())
-    assert card is not None
-    left, top, right, bottom = card
-    clipped = [shot for shot in shots if shot.clipped[top:bottom, left:right].any()]
+    """Return each light's relative irradiance at the centre of the painting, of mean 1, shape (L, 1)."""
+    what = "shows its lamp clipped, so that its intensity cannot be told"
+    do = "Expose the spheres for less time, or take the intensities from a card with --card"
     raise_problems(
         CaptureError,
-        [Problem(shot.path.name, "shows the card clipped", "Expose it for less time") for shot in clipped],
+        [
+            Problem(shot.path.name, what, do)
+            for shot, views in zip(shots, seen, strict=True)
+            if any(view is not None and view.clipped for view in views)
+        ],
     )
+    gains = np.array([
+        [np.mean([v.irradiance * _to_centre(v.point, lights, row) for v in views if v is not None])]
+        for row, views in enumerate(seen)
+    ])  # fmt: skip
+    return np.asarray(gains / gains.mean())
+
+
+def _gains_on_card(shots: Sequence[Shot], card: Sequence[int], lights: Lights, rays: Rays) -> Array:
+    """Return the same from what photographs show of the card alone, per channel, shape (L, C)."""
+    raise_problems(
+        CaptureError,
+        [
+            Problem(shot.path.name, "shows the card clipped", "Expose it for less time")
+            for shot in shots
+            if shot.clipped.any()
+        ],
+    )
+    left, top, right, bottom = card
     place, _ = rays(np.array([(left + right - 1) / 2]), np.array([(top + bottom - 1) / 2]))
     rows = []
     for row, shot in enumerate(shots):
         towards = lights.position_mm[row] - place[0]
         near = np.isfinite(towards).all()
         cosine = towards[2] / np.linalg.norm(towards) if near else lights.direction[row, 2]
-        rows.append(box_mean(shot.linear(), card) * _to_centre(place[0], lights, row) / cosine)
+        level = shot.linear().mean(axis=(0, 1), dtype=np.float64)
+        rows.append(level * _to_centre(place[0], lights, row) / cosine)
     gains = np.array(rows)
     return np.asarray(gains / gains.mean())
 

@@ -142,18 +142,31 @@ class Reflection:
     clipped: bool
 
 
+def sphere_window(sphere: Sphere, height: int, width: int) -> tuple[slice, slice]:
+    """Return the rows and columns of an image of that size in which a sphere lies."""
+    column, row, radius = sphere.circle
+    return (
+        slice(max(0, int(row - radius)), min(height, int(row + radius) + 2)),
+        slice(max(0, int(column - radius)), min(width, int(column + radius) + 2)),
+    )
+
+
 def find_reflection(
-    image: Array, background: Array, clipped: NDArray[np.bool_], sphere: Sphere, rays: Rays
+    image: NDArray[np.floating],
+    background: NDArray[np.floating],
+    clipped: NDArray[np.bool_],
+    sphere: Sphere,
+    rays: Rays,
 ) -> Reflection | None:
     """Find the lamp in a sphere.
 
     Parameters
     ----------
-    image : ndarray of shape (H, W)
-        Relative radiance under this lamp.
-    background : ndarray of shape (H, W)
+    image : ndarray of shape (rows, columns)
+        Relative radiance under this lamp, in the sphere's window.
+    background : ndarray of shape (rows, columns)
         The same under other lamps: what stays is no lamp.
-    clipped : ndarray of shape (H, W), bool
+    clipped : ndarray of shape (rows, columns), bool
     sphere : Sphere
     rays : Rays
 
@@ -169,18 +182,14 @@ def find_reflection(
     4 dA / R², so that the mean of their directions, weighted by radiance, points to the middle of the lamp.
     """
     column, row, radius = sphere.circle
-    window = (
-        slice(max(0, int(row - radius)), min(image.shape[0], int(row + radius) + 2)),
-        slice(max(0, int(column - radius)), min(image.shape[1], int(column + radius) + 2)),
-    )
-    rows, columns = np.mgrid[window]
+    rows, columns = np.mgrid[sphere_window(sphere, rays.height, rays.width)]
     inside = np.hypot(columns - column, rows - row) < _RIM * radius
-    lit = np.where(inside, np.maximum(image[window] - background[window], 0), 0)
+    lit = np.where(inside, np.maximum(image - background, 0), 0).astype(np.float64)
     smooth = gaussian_filter(lit, max(0.7, radius / 150))
     peak = float(smooth.max())
     if peak <= _LEAST_CONTRAST * max(float(np.percentile(smooth[inside], 90)), 1e-9):
         return None
-    at_peak = clipped[window][np.unravel_index(smooth.argmax(), smooth.shape)]
+    at_peak = clipped[np.unravel_index(smooth.argmax(), smooth.shape)]
     core = at_peak and np.count_nonzero(smooth > _CORE_SHARE * peak) >= _CORE_PX
     regions, count = label((smooth > (_CORE_SHARE if core else _LAMP_SHARE) * peak) & inside)
     weight = np.bincount(regions.ravel(), lit.ravel(), minlength=count + 1)
@@ -203,5 +212,5 @@ def find_reflection(
         direction=direction / np.linalg.norm(direction),
         pixel=(float(values @ spot_columns) / total, float(values @ spot_rows) / total),
         irradiance=total * 4 * (rays.px / sphere.radius) ** 2,
-        clipped=bool(clipped[window][spot].any()),
+        clipped=bool(clipped[spot].any()),
     )

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from impasto.calibrate.files import subject_of, write_calibration
-from impasto.calibrate.patches import Array, Patches, read_patches
+from impasto.calibrate.patches import Array, Patches, read_parts, read_patches
 from impasto.calibrate.response import Response, fit_response
 from impasto.calibrate.response_plot import draw_response
-from impasto.calibrate.shots import Shot, read_shot, read_shots
+from impasto.calibrate.shots import Shot, one_by_one, read_shot
 from impasto.errors import CaptureError, Problem, raise_problems
 
 # Share of a patch's samples that may be clipped, or black.
@@ -115,25 +115,43 @@ def oecf(
     """
     paths = [photos] if isinstance(photos, str | PathLike) else list(photos)
     target = read_patches(Path(patches), ("reflectance",), ("density",)).without(list(without))
-    shots = read_shots(Path(path) for path in paths)
-    extra = [None if path is None else read_shot(Path(path)) for path in (card, dark)]
-    even, capped = extra
-    raise_problems(CaptureError, _problems(shots, target, extra, exposures_s))
+    shots: list[Shot] = []
+    parts: list[list[Shot]] = []
+    problems: list[Problem] = []
+    # One photograph at a time is in memory; of the others, the patches are kept.
+    for shot in one_by_one(Path(path) for path in paths):
+        if not shots:
+            problems += _target_problems(shot, target)
+        shots.append(shot.without_pixels)
+        parts.append(_parts(shot, target))
+    extra: list[Shot] = []
+    even: list[Shot] | None = None
+    if card is not None:
+        shot = read_shot(Path(card))
+        extra.append(shot.without_pixels)
+        even = _parts(shot, target)
+    black = np.zeros(shots[0].photograph.channels)
+    if dark is not None:
+        shot = read_shot(Path(dark))
+        extra.append(shot.without_pixels)
+        black = np.median(shot.codes, axis=(0, 1))
+    problems += _differing(extra, shots[0])
+    raise_problems(CaptureError, problems + _exposure_problems(shots, exposures_s))
     reflectance = target.known.get(
         "reflectance", 10 ** -target.known.get("density", np.zeros(len(target.names)))
     )
     exposure = _exposures(shots, exposures_s)
-    black = np.zeros(shots[0].codes.shape[2]) if capped is None else np.median(capped.codes, axis=(0, 1))
-    readings = _readings(shots, target, reflectance, exposure)
+    readings = _readings(parts, target, reflectance, exposure)
     largest = float(np.iinfo(shots[0].codes.dtype).max)
-    response, radiance = _fit(readings, target, black, largest, even)
+    card_codes = None if even is None else read_parts([part.codes for part in even])[0]
+    response, radiance = _fit(readings, black, largest, card_codes)
     # The mean of codes is not the code of the mean where noise meets a bent response.
     for _ in range(_UNBENDING):
-        readings = _unbent(readings, response, shots, target)
-        response, radiance = _fit(readings, target, black, largest, even)
+        readings = _unbent(readings, response, parts)
+        response, radiance = _fit(readings, black, largest, card_codes)
     _check_rising(readings, radiance, target)
     notes = _clipped_notes(readings, target)
-    if even is not None and (target.read(even.codes)[0] > response.measured[:, 1]).any():
+    if card_codes is not None and (card_codes > response.measured[:, 1]).any():
         notes.append(
             "the card is brighter than the brightest patch, where the response is not known; expose it less"
         )
@@ -158,7 +176,6 @@ def oecf(
         patches=len(readings.patch),
         notes=tuple(notes),
     )
-    used = [*shots, *(shot for shot in extra if shot is not None)]
     content = {
         "dtype": shots[0].codes.dtype.name,
         "response": response.as_json(),
@@ -169,7 +186,7 @@ def oecf(
         "patches": list(target.names),
         "boxes_px": [list(box) for box in target.boxes],
     }
-    made_from = [*(shot.provenance for shot in used), target.source]
+    made_from = [*(shot.provenance for shot in shots + extra), target.source]
     write_calibration(file, "oecf", content, subject=subject_of(shots, iso=True), made_from=made_from)
     draw_response(plot, response, readings.code, radiance * scale, residual, readings.variance, noise)
     return found
@@ -188,14 +205,14 @@ class _Readings:
     unusable: dict[int, str]
 
 
-def _fit(
-    readings: _Readings, target: Patches, black: Array, largest: float, card: Shot | None
-) -> tuple[Response, Array]:
-    """Return the response and the radiance of the patches read, shape (N, C)."""
+def _fit(readings: _Readings, black: Array, largest: float, codes: Array | None) -> tuple[Response, Array]:
+    """Return the response and the radiance of the patches read, shape (N, C).
+
+    `codes`, of shape (P, C), are what the card reads in the patches' places.
+    """
     radiance = np.repeat(readings.radiance[:, None], len(black), axis=1)
-    if card is None:
+    if codes is None:
         return fit_response(readings.code, readings.sd, radiance, black, largest), radiance
-    codes, _, _ = target.read(card.codes)
     light = (codes - black) / (codes - black).mean(axis=0)
     # How even the light is can be told only once the response is known, and the other way round.
     for _ in range(_LARGEST_ROUND):
@@ -207,10 +224,12 @@ def _fit(
     return response, radiance * light[readings.patch]
 
 
-def _problems(
-    shots: Sequence[Shot], target: Patches, extra: Sequence[Shot | None], exposures_s: Sequence[float]
-) -> list[Problem]:
-    first = shots[0]
+def _parts(shot: Shot, target: Patches) -> list[Shot]:
+    """Return what a photograph shows of each patch."""
+    return [shot.part(target.inner(row)) for row in range(len(target.names))]
+
+
+def _target_problems(first: Shot, target: Patches) -> list[Problem]:
     problems = target.problems(*first.codes.shape[:2])
     if len(target.names) < _LEAST_PATCHES:
         what = f"holds {len(target.names)} patches, expected at least {_LEAST_PATCHES}"
@@ -223,23 +242,30 @@ def _problems(
     if first.codes.dtype.kind == "f":
         do = "Photographs that hold floats need no such function"
         problems.append(Problem(first.path.name, "holds linear floats, expected codes of 8 or 16 bits", do))
-    problems += [
-        Problem(
-            shot.path.name, "has another size or type than the grey scale's photograph", "Export both alike"
-        )
-        for shot in extra
-        if shot is not None and (shot.codes.shape, shot.codes.dtype) != (first.codes.shape, first.codes.dtype)
+    return problems
+
+
+def _differing(shots: Sequence[Shot], first: Shot) -> list[Problem]:
+    """Return a problem for each photograph that is not like the grey scale's."""
+    expected = f"expected {first.layout} as the grey scale's photograph"
+    return [
+        Problem(shot.path.name, f"has {shot.layout}, {expected}", "Export both alike")
+        for shot in shots
+        if shot.layout != first.layout
     ]
+
+
+def _exposure_problems(shots: Sequence[Shot], exposures_s: Sequence[float]) -> list[Problem]:
     if exposures_s and len(exposures_s) != len(shots):
         what = f"were given for {len(exposures_s)} of {len(shots)} photographs"
-        problems.append(Problem("--exposure-s", what, "Give one exposure time per photograph"))
-    elif not exposures_s and len(shots) > 1:
-        problems += [
-            Problem(shot.path.name, "does not say its exposure time", "Give it for each with --exposure-s")
-            for shot in shots
-            if shot.photograph.exposure_s is None
-        ]
-    return problems
+        return [Problem("--exposure-s", what, "Give one exposure time per photograph")]
+    if exposures_s or len(shots) == 1:
+        return []
+    return [
+        Problem(shot.path.name, "does not say its exposure time", "Give it for each with --exposure-s")
+        for shot in shots
+        if shot.photograph.exposure_s is None
+    ]
 
 
 def _exposures(shots: Sequence[Shot], given: Sequence[float]) -> Array:
@@ -250,16 +276,17 @@ def _exposures(shots: Sequence[Shot], given: Sequence[float]) -> Array:
     return np.asarray(times / times.max())
 
 
-def _readings(shots: Sequence[Shot], target: Patches, reflectance: Array, exposure: Array) -> _Readings:
+def _readings(
+    parts: Sequence[Sequence[Shot]], target: Patches, reflectance: Array, exposure: Array
+) -> _Readings:
     rows = []
     unusable: dict[int, str] = {}
     usable = set()
-    for number, shot in enumerate(shots):
-        mean, variance, pixels = target.read(shot.codes)
-        for patch in range(len(target.names)):
-            inner = target.inner(patch)
-            clipped = float(shot.clipped[inner].mean(axis=(0, 1)).max())
-            black = float((shot.codes[inner] == 0).mean(axis=(0, 1)).max())
+    for number, shown in enumerate(parts):
+        mean, variance, pixels = read_parts([part.codes for part in shown])
+        for patch, part in enumerate(shown):
+            clipped = float(part.clipped.mean(axis=(0, 1)).max())
+            black = float((part.codes == 0).mean(axis=(0, 1)).max())
             if clipped > _CLIPPED or black > _BLACK:
                 how = f"clipped in {clipped:.1%}" if clipped > _CLIPPED else f"black in {black:.1%}"
                 unusable[patch] = f"is {how} of its samples"
@@ -281,10 +308,10 @@ def _readings(shots: Sequence[Shot], target: Patches, reflectance: Array, exposu
     return _Readings(patches, numbers, radiances, codes, sds, variances, unusable)
 
 
-def _unbent(readings: _Readings, response: Response, shots: Sequence[Shot], target: Patches) -> _Readings:
+def _unbent(readings: _Readings, response: Response, parts: Sequence[Sequence[Shot]]) -> _Readings:
     """Return the readings with the code of each patch's mean radiance instead of its mean code."""
-    table = response.table(shots[0].codes.dtype)
-    means = np.array([target.read(shot.linear(table))[0] for shot in shots])
+    table = response.table(parts[0][0].codes.dtype)
+    means = np.array([read_parts([part.linear(table) for part in shown])[0] for shown in parts])
     return replace(readings, code=response.codes(means[readings.shot, readings.patch]))
 
 

@@ -74,26 +74,8 @@ class Patches:
         return slice(top + down, bottom - down), slice(left + across, right - across)
 
     def read(self, image: NDArray[Any]) -> tuple[Array, Array, NDArray[np.intp]]:
-        """Return what a photograph (H, W, C) shows in each patch.
-
-        Returns
-        -------
-        mean : ndarray of shape (P, C)
-        variance : ndarray of shape (P, C)
-            About the plane that fits the patch best, so that light that falls off across it does not count.
-        pixels : ndarray of shape (P,)
-        """
-        means, variances, pixels = [], [], []
-        for row in range(len(self.names)):
-            patch = np.asarray(image[self.inner(row)], np.float64)
-            y, x = np.mgrid[-1 : 1 : patch.shape[0] * 1j, -1 : 1 : patch.shape[1] * 1j]
-            plane = np.column_stack([np.ones(x.size), x.ravel(), y.ravel()])
-            samples = patch.reshape(x.size, -1)
-            fit, *_ = np.linalg.lstsq(plane, samples, rcond=None)
-            means.append(samples.mean(axis=0))
-            variances.append(((samples - plane @ fit) ** 2).sum(axis=0) / max(1, x.size - 3))
-            pixels.append(x.size)
-        return np.array(means), np.array(variances), np.array(pixels)
+        """Return what a photograph (H, W, C) shows in each patch, as `read_parts` does."""
+        return read_parts([image[self.inner(row)] for row in range(len(self.names))])
 
     def problems(self, height: int, width: int) -> list[Problem]:
         """Return what is wrong with the boxes for a photograph."""
@@ -108,6 +90,34 @@ class Patches:
                 what = f"has fewer than {_LEAST_PX} pixels"
                 found.append(Problem(f"patch {name}", what, "Photograph the target larger"))
         return found
+
+
+def read_parts(parts: Sequence[NDArray[Any]]) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Return what is seen in patches.
+
+    Parameters
+    ----------
+    parts : sequence, length P, of ndarray of shape (rows, columns, C)
+        What a photograph shows of each.
+
+    Returns
+    -------
+    mean : ndarray of shape (P, C)
+    variance : ndarray of shape (P, C)
+        About the plane that fits the patch best, so that light that falls off across it does not count.
+    pixels : ndarray of shape (P,)
+    """
+    means, variances, pixels = [], [], []
+    for part in parts:
+        patch = np.asarray(part, np.float64)
+        y, x = np.mgrid[-1 : 1 : patch.shape[0] * 1j, -1 : 1 : patch.shape[1] * 1j]
+        plane = np.column_stack([np.ones(x.size), x.ravel(), y.ravel()])
+        samples = patch.reshape(x.size, -1)
+        fit, *_ = np.linalg.lstsq(plane, samples, rcond=None)
+        means.append(samples.mean(axis=0))
+        variances.append(((samples - plane @ fit) ** 2).sum(axis=0) / max(1, x.size - 3))
+        pixels.append(x.size)
+    return np.array(means), np.array(variances), np.array(pixels)
 
 
 def read_patches(path: Path, *needed: tuple[str, ...]) -> Patches:

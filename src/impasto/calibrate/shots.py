@@ -22,6 +22,9 @@ Table = NDArray[np.float64]
 # As in a capture: see impasto.capture.
 _CLIP_LEVEL = {"uint8": 254, "uint16": int(0.99 * 65535)}
 
+# Rows decoded, or made linear, at a time.
+_SLAB_ROWS = 256
+
 
 @dataclass(frozen=True)
 class Shot:
@@ -48,6 +51,13 @@ class Shot:
         return self.photograph.path
 
     @property
+    def layout(self) -> str:
+        """Size, channels and type in words."""
+        photograph = self.photograph
+        channels = f"{photograph.channels} channels of {photograph.dtype}"
+        return f"{photograph.width} x {photograph.height} pixels, {channels}"
+
+    @property
     def clipped(self) -> NDArray[np.bool_]:
         """Which samples are clipped, ndarray of shape (H, W, C)."""
         level = _CLIP_LEVEL.get(self.codes.dtype.name)
@@ -72,10 +82,22 @@ class Shot:
         channels = [table[:, c].astype(np.float32)[self.codes[..., c]] for c in range(self.codes.shape[2])]
         return np.stack(channels, axis=-1)
 
+    def luminance(self) -> Image:
+        """Return the mean over the channels of relative radiance, ndarray of shape (H, W)."""
+        out = np.empty(self.codes.shape[:2], np.float32)
+        for row in range(0, len(out), _SLAB_ROWS):
+            slab = slice(row, row + _SLAB_ROWS)
+            out[slab] = replace(self, codes=self.codes[slab]).linear().mean(axis=2)
+        return out
+
+    def part(self, where: tuple[slice, slice]) -> Shot:
+        """Return the same with a copy of some rows and columns alone, so that the rest can be forgotten."""
+        return replace(self, codes=self.codes[where].copy())
+
     @property
     def without_pixels(self) -> Shot:
         """The same without what takes memory."""
-        return replace(self, codes=self.codes[:0].copy())
+        return self.part((slice(0), slice(None)))
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -83,7 +105,7 @@ class Shot:
         photograph = self.photograph
         return {
             "file": self.path.name,
-            "sha256": hashlib.sha256(self.path.read_bytes()).hexdigest(),
+            "sha256": _sha256(self.path),
             "exposure_s": photograph.exposure_s,
         }
 
@@ -99,8 +121,10 @@ def read_shot(path: Path) -> Shot:
     if not path.is_file():
         raise CaptureError(Problem(str(path), "is not a file", "Give the name of a photograph"))
     photograph, _ = read_photograph(path)
-    bands = [np.array(band) for _, band in photograph.bands(photograph.height)]
-    return Shot(photograph, np.concatenate(bands))
+    codes = np.empty((photograph.height, photograph.width, photograph.channels), photograph.dtype)
+    for row, band in photograph.bands(_SLAB_ROWS):
+        codes[row : row + len(band)] = band
+    return Shot(photograph, codes)
 
 
 def read_shots(paths: Iterable[Path]) -> list[Shot]:
@@ -123,18 +147,18 @@ def one_by_one(paths: Iterable[Path]) -> Iterator[Shot]:
         After the last, listing all that cannot be read, or that differ in size from the first.
     """
     problems: list[Problem] = []
-    first: Photograph | None = None
+    first: Shot | None = None
     for path in paths:
         try:
             shot = read_shot(path)
         except CaptureError as error:
             problems += error.problems
             continue
-        first = first or shot.photograph
-        if _layout(shot.photograph) == _layout(first):
+        first = first or shot.without_pixels
+        if shot.layout == first.layout:
             yield shot
             continue
-        what = f"has {_layout(shot.photograph)}, expected {_layout(first)} as {first.path.name}"
+        what = f"has {shot.layout}, expected {first.layout} as {first.path.name}"
         problems.append(Problem(path.name, what, "Export all of them alike, or leave it out"))
     raise_problems(CaptureError, problems)
 
@@ -192,6 +216,6 @@ def common(shots: Sequence[Shot], what: Callable[[Photograph], Any]) -> Any:
     return said.pop() if len(said) == 1 else None
 
 
-def _layout(photograph: Photograph) -> str:
-    channels = f"{photograph.channels} channels of {photograph.dtype}"
-    return f"{photograph.width} x {photograph.height} pixels, {channels}"
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

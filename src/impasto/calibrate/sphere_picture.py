@@ -11,10 +11,19 @@ from numpy.typing import NDArray
 from impasto.calibrate.mirror import Reflection, Sphere
 from impasto.output import written_whole
 
+_LONGEST_PX = 1600
+
+
+def thinned(image: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return as many rows and columns of an image as a picture shows."""
+    step = -(-max(image.shape) // _LONGEST_PX)
+    return image[::step, ::step]
+
 
 def draw_spheres(
     path: Path,
     image: NDArray[np.floating],
+    size: tuple[int, int],
     spheres: Sequence[Sphere],
     seen: Sequence[Sequence[Reflection | None]],
     names: Sequence[str],
@@ -26,8 +35,10 @@ def draw_spheres(
     ----------
     path : Path
         PNG file to write.
-    image : ndarray of shape (H, W)
-        Relative radiance.
+    image : ndarray of shape (rows, columns)
+        Relative radiance, `thinned`.
+    size : (int, int)
+        Height and width of the photographs.
     spheres : sequence of Sphere
     seen : sequence, length L, of one Reflection or None per sphere
     names : sequence of str, length L
@@ -43,12 +54,12 @@ def draw_spheres(
     from matplotlib.figure import Figure
     from matplotlib.patches import Circle
 
-    height, width = image.shape
+    height, width = size
     figure = Figure(figsize=(9.0, 9.0 * height / width + 0.2), dpi=130, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots()
     shown = np.sqrt(np.clip(image / max(float(np.percentile(image, 99.5)), 1e-12), 0, 1))
-    axes.imshow(shown, cmap="gray")
+    axes.imshow(shown, cmap="gray", extent=(-0.5, width - 0.5, height - 0.5, -0.5))
     for sphere in spheres:
         column, row, radius = sphere.circle
         axes.add_patch(Circle((column, row), radius, fill=False, color="#56b4e9", linewidth=1.0))

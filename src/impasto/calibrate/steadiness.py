@@ -106,7 +106,7 @@ def steadiness(
     seen: list[list[NDArray[np.float32]]] = []
     subject, size = Subject(), (0, 0)
     for shot in one_by_one(paths):
-        luminance = shot.linear().mean(axis=2)
+        luminance = shot.luminance()
         if not seen:
             subject, size = subject_of([shot], size=True), luminance.shape
         seen.append([np.array(luminance[part], np.float32) for part in part_slices(*size)])

@@ -109,14 +109,14 @@ def white(
     shots: list[Shot] = []
     found = []
     clipped = False
-    # One photograph at a time is in memory; but for the first, only what is said about it is kept.
+    # One photograph at a time is in memory; of the others, only what is said about them is kept.
     for shot in one_by_one(paths):
         if not shots:
             raise_problems(OptionError, [*box_problems(box, shot.codes.shape, "--box"), *problems])
             raise_problems(CaptureError, file.problems)
             tilt = tilt / np.linalg.norm(tilt)
             table = response_table(oecf, [shot])
-        shots.append(shot.without_pixels if shots else shot)
+        shots.append(shot.without_pixels)
         row = _row(light or shot.name, file)
         if row is None:
             continue

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, label
 
-from impasto.calibrate.mirror import Rays, find_reflection, given_sphere
+from impasto.calibrate.mirror import Rays, find_reflection, given_sphere, sphere_window
 from impasto.calibrate.outline import Circle, find_circles
 from impasto.calibrate.shots import read_shots
 from impasto.geometry import Array, Camera
@@ -98,11 +98,15 @@ def lamp_directions(
         return [None] * len(images)
     rays = Rays(camera, *images[0].shape)
     spheres = [given_sphere(circle, rays) for circle in circles]
+    windows = [sphere_window(sphere, rays.height, rays.width) for sphere in spheres]
     # What most lamps leave as it is, is the room.
     background = np.median(images, axis=0)
     found: list[Array | None] = []
     for image, lost in zip(images, clipped, strict=True):
-        seen = [find_reflection(image, background, lost, sphere, rays) for sphere in spheres]
+        seen = [
+            find_reflection(image[at], background[at], lost[at], sphere, rays)
+            for sphere, at in zip(spheres, windows, strict=True)
+        ]
         directions = [reflection.direction for reflection in seen if reflection is not None]
         found.append(np.median(directions, axis=0) if directions else None)
     return found
