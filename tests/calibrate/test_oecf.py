@@ -117,6 +117,16 @@ def test_patches_that_read_the_same_count_as_one(folder, tmp_path):
     assert errors(twice, "tone").max() < 0.003
 
 
+def test_patches_that_are_nearly_alike_may_trade_places(folder, tmp_path):
+    """Two exposures a stop apart show the same radiance twice, as well as the densities are known."""
+    photo, table = (folder / "linear" / name for name in ("grey_scale.tif", "grey_scale.csv"))
+    codes = tifffile.imread(photo)
+    tifffile.imwrite(tmp_path / "less.tif", np.uint16(codes * 0.99), photometric="rgb")
+    photos = [photo, tmp_path / "less.tif"]
+    found = impasto.calibrate.oecf(photos, table, tmp_path / "o.json", exposures_s=[1, 1.001])
+    assert found.residual < 0.02
+
+
 def test_all_that_is_wrong_is_listed(folder, tmp_path):
     table = (folder / "tone" / "grey_scale.csv").read_text().splitlines()
     cells = table[3].split(",")

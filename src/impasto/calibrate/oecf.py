@@ -24,7 +24,7 @@ _BLACK = 0.02
 _LEAST_PATCHES = 5
 # Residual of the best straight line below which a camera counts as linear.
 _LINEAR = 0.01
-# Neighbouring patches whose radiance differs by less than this may trade places by noise.
+# Patches whose radiance differs by less than this factor may trade places: tables are not that exact.
 _ALIKE = 1.02
 _LARGEST_ROUND = 60
 _EVEN = 1e-5
@@ -327,15 +327,13 @@ def _check_rising(readings: _Readings, radiance: Array, target: Patches) -> None
     for channel in range(radiance.shape[1]):
         order = np.argsort(radiance[:, channel])
         level, code = radiance[order, channel], readings.code[order, channel]
-        sd = readings.sd[order, channel]
-        for low in range(len(order) - 1):
-            noise = 3 * np.hypot(sd[low], sd[low + 1])
-            alike = level[low + 1] < _ALIKE * level[low]
-            if code[low + 1] <= code[low] - (noise if alike else 0):
-                darker, brighter = (target.names[readings.patch[order[row]]] for row in (low, low + 1))
+        above = np.searchsorted(level, _ALIKE * level)
+        for low, high in enumerate(above[above < len(order)]):
+            if code[high] <= code[low]:
+                darker, brighter = (target.names[readings.patch[order[row]]] for row in (low, high))
                 problems[brighter] = Problem(
                     f"patch {brighter}",
-                    f"reads {code[low + 1]:.0f}, not above the {code[low]:.0f} of the darker patch {darker}",
+                    f"reads {code[high]:.0f}, not above the {code[low]:.0f} of the darker patch {darker}",
                     "Check the table and that the light is even (--card), or leave one out with --without",
                 )
     raise_problems(CaptureError, problems.values())

@@ -19,7 +19,7 @@ _SMOOTHING = 0.15
 _LEAST_SD = 3e-4
 # Patches whose codes above black differ by less than this share, as those of several exposures may, count as
 # one: a spline through both would follow their noise.
-_SAME = 0.005
+_SAME = 0.02
 
 
 @dataclass(frozen=True)
