@@ -136,16 +136,18 @@ def compress(process: LightProcess, hull: Array, moments: Array, count: int) -> 
 
 def hull_of(direction: Array) -> Array:
     """Return the sides of the convex cone of directions (L, 3): unit vectors (F, 3) that point into it."""
-    from scipy.spatial import ConvexHull
-
     values = np.linalg.svd(direction, full_matrices=True)
     across = values[2]
     if len(direction) < 3 or values[1][-1] < 1e-6 * values[1][0]:
         return _arc(direction, across[-1])
-    corners = np.concatenate([np.zeros((1, 3)), direction])
-    hull = ConvexHull(corners)
-    sides = hull.equations[(hull.simplices == 0).any(axis=1), :3]
-    return np.unique(np.round(-sides, 9), axis=0)
+    sides = []
+    for corner in direction:
+        # A plane through two lights is a side if no light lies beyond it. (scipy takes a second to import.)
+        normal = np.cross(corner, direction)
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        normal = normal[length[:, 0] > 1e-9] / length[length > 1e-9, None]
+        sides.append(normal[(normal @ direction.T > -1e-9).all(axis=1)])
+    return np.unique(np.round(np.concatenate(sides), 9), axis=0)
 
 
 def _arc(direction: Array, across: Array) -> Array:
