@@ -7,7 +7,11 @@ material look alike there.
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -187,35 +191,54 @@ def _solve(around: _Linearised, lights: Lights, correction: Array, prior: Array)
     target = around.rest + np.einsum("kl,klp->lp", correction, around.slope)
     weight = np.ones_like(target)
     found = correction
-    for _ in range(_REWEIGHTINGS):
-        normal = np.zeros((3, count, 3 * count))
-        right = np.zeros((3, count))
-        precisions = []
-        for first in range(0, pixels, _BLOCK):
-            part = slice(first, first + _BLOCK)
-            linear, slope = around.linear[:, :, part], around.slope[:, :, part].transpose(2, 0, 1)
-            covariance = np.einsum("lkp,mkp->plm", linear, linear) + smooth
-            diagonal = np.arange(count)
-            covariance[:, diagonal, diagonal] += (around.variance[:, part] / weight[:, part]).T
-            precision = np.linalg.inv(covariance)
-            precisions.append(precision)
-            projected = np.einsum("plm,pkm->plkm", precision, slope).reshape(len(precision), count, -1)
-            for kind in range(3):
-                normal[kind] += np.einsum("pl,plx->lx", slope[:, kind], projected)
-            right += np.einsum("pkl,plm,mp->kl", slope, precision, target[:, part], optimize=True)
-        matrix = normal.reshape(3 * count, -1) + np.linalg.inv(prior)
-        found = np.linalg.solve(matrix, right.ravel()).reshape(3, count)
-        error = target - np.einsum("kl,klp->lp", found, around.slope)
-        weight = _weights(error, precisions)
+    prior_precision = np.linalg.inv(prior)
+    blocks = [slice(first, first + _BLOCK) for first in range(0, pixels, _BLOCK)]
+    with ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="directions") as pool:
+        for _ in range(_REWEIGHTINGS):
+            eliminated = pool.map(partial(_eliminate, around, smooth, target, weight), blocks)
+            # Summed in the order of the blocks: the result does not depend on the threads.
+            normal, right, precisions = zip(*eliminated, strict=True)
+            matrix = sum(normal).reshape(3 * count, -1) + prior_precision
+            found = np.linalg.solve(matrix, sum(right).ravel()).reshape(3, count)
+            error = target - np.einsum("kl,klp->lp", found, around.slope)
+            weight = _weights(error, precisions)
     return found
 
 
-def _weights(error: Array, precisions: list[Array]) -> Array:
+def _eliminate(
+    around: _Linearised, smooth: Array, target: Array, weight: Array, part: slice
+) -> tuple[Array, Array, Array]:
+    """Return what pixels tell of the corrections once their own unknowns are eliminated.
+
+    Returns
+    -------
+    normal : ndarray of shape (3, L, 3, L)
+        Matrix of the normal equations.
+    right : ndarray of shape (3, L)
+        Their right side.
+    precision : ndarray of shape (P, L, L)
+        Inverse covariance of each pixel's residuals.
+    """
+    count = len(target)
+    linear, slope = around.linear[:, :, part].transpose(2, 0, 1), around.slope[:, :, part].transpose(2, 0, 1)
+    covariance = linear @ linear.transpose(0, 2, 1) + smooth
+    diagonal = np.arange(count)
+    covariance[:, diagonal, diagonal] += (around.variance[:, part] / weight[:, part]).T
+    precision = np.asarray(np.linalg.inv(covariance), np.float64)
+    projected = (precision[:, :, None, :] * slope[:, None, :, :]).reshape(len(precision), count, -1)
+    # Light by light, over the pixels.
+    normal = slope.transpose(2, 1, 0) @ projected.transpose(1, 0, 2)
+    whitened = (precision @ target[:, part].T[:, :, None])[:, None, :, 0]
+    right: Array = (slope * whitened).sum(axis=0)
+    return normal.transpose(1, 0, 2).reshape(3, count, 3, count), right, precision
+
+
+def _weights(error: Array, precisions: Sequence[Array]) -> Array:
     """Return Cauchy weights (L, N) by how far each sample is from what the pixel's others let expect."""
     departures = []
     for number, precision in enumerate(precisions):
         part = error[:, number * _BLOCK : (number + 1) * _BLOCK]
         own = np.sqrt(np.diagonal(precision, axis1=1, axis2=2).T)
-        departures.append(np.einsum("plm,mp->lp", precision, part) / own)
+        departures.append((precision @ part.T[:, :, None])[:, :, 0].T / own)
     result: Array = 1.0 / (1.0 + np.square(np.concatenate(departures, axis=1) / 2.0))
     return result

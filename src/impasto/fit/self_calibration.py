@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -148,15 +150,19 @@ def _log_strength(
     """Return for each light and channel the weighted median of ln(measured / radiance), shape (L, C)."""
     result = np.zeros((measured.shape[0], measured.shape[2]))
     usable = (measured > floor) & (radiance > floor) & ~clipped
-    for place in np.ndindex(result.shape):
+
+    def find(place: tuple[int, int]) -> None:
         light, channel = place
         here = usable[light, :, channel]
         if here.sum() < 16:
-            continue
+            return
         one, other = measured[light, here, channel], radiance[light, here, channel]
         highlight = 1.0 - matte[light, here, channel] / other
         known = 1.0 / (1.0 + np.square(highlight / _HIGHLIGHT))
         result[place] = _weighted_median(np.log(one / other), np.minimum(one, other) * known)
+
+    with ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="strengths") as pool:
+        list(pool.map(find, np.ndindex(result.shape)))
     return result
 
 
