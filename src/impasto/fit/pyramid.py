@@ -30,10 +30,7 @@ def halve(values: NDArray[np.floating]) -> NDArray[np.floating]:
     ndarray of shape (ceil(H / 2), ceil(W / 2)[, K])
         NaN where no pixel of a block has a value. A block at an odd edge has fewer pixels.
     """
-    odd = [(0, values.shape[0] % 2), (0, values.shape[1] % 2)] + [(0, 0)] * (values.ndim - 2)
-    if any(after for _, after in odd):
-        values = np.pad(values, odd, constant_values=np.nan)
-    corners = _corners(values)
+    corners = _corners(_even(values, constant_values=np.nan))
     total = (corners[0] + corners[1]) + (corners[2] + corners[3])
     mean: NDArray[np.floating] = total * values.dtype.type(0.25)
     gaps = np.isnan(mean)
@@ -60,16 +57,23 @@ def halve_status(status: NDArray[np.uint8]) -> NDArray[np.uint8]:
     # A code that this version does not know counts as the worst.
     rank = np.full(256, len(severity) - 1, np.uint8)
     rank[severity] = np.arange(len(severity))
-    padded = np.pad(status, [(0, size % 2) for size in status.shape], mode="edge")
-    return severity[np.maximum.reduce(_corners(rank[padded]))]
+    return severity[np.maximum.reduce(_corners(rank[_even(status, mode="edge")]))]
 
 
 def halve_codes(codes: NDArray[np.uint16]) -> NDArray[np.uint16]:
     """Return the mean of each 2 x 2 block of codes (H, W, K), rounded; linear in what they stand for."""
-    padded = np.pad(codes, [(0, size % 2) for size in codes.shape[:2]] + [(0, 0)], mode="edge")
-    total: NDArray[np.uint32] = np.stack(_corners(padded)).sum(axis=0, dtype=np.uint32)
-    mean: NDArray[np.uint16] = ((total + 2) // 4).astype(np.uint16)
-    return mean
+    first, *others = _corners(_even(codes, mode="edge"))
+    total = first + np.uint32(2)
+    for corner in others:
+        total += corner
+    total >>= 2
+    return total.astype(np.uint16)
+
+
+def _even(values: NDArray[Any], **padding: Any) -> NDArray[Any]:
+    """Return values (H, W[, K]) with a row and a column more where their number is odd."""
+    odd = [(0, size % 2) for size in values.shape[:2]] + [(0, 0)] * (values.ndim - 2)
+    return np.pad(values, odd, **padding) if np.any(odd) else values
 
 
 def _corners(values: NDArray[Any]) -> list[NDArray[Any]]:
