@@ -198,3 +198,15 @@ def test_bad_cards_and_boxes_are_named(near, tmp_path):
             reflectance=7,
         )
     assert len(error.value.problems) == 2
+
+
+def test_a_dark_level_that_differs_over_the_frame_does_not_tilt_the_flat_field(tmp_path):
+    import tifffile
+
+    rising = np.linspace(0.01, 0.05, 300)[None, :, None] * np.ones((200, 300, 3))
+    for name, image in (("dark", rising), ("card", 0.5 + rising)):
+        tifffile.imwrite(tmp_path / f"{name}.tif", np.uint16(65535 * image), photometric="rgb")
+    impasto.calibrate.dark(tmp_path / "dark.tif", tmp_path / "dark.json")
+    for dark in ("dark.tif", "dark.json"):
+        found = impasto.calibrate.flat(tmp_path / "card.tif", tmp_path / "f.json", dark=tmp_path / dark)
+        assert found.before < 1e-3

@@ -103,3 +103,19 @@ def test_every_other_calibration_is_refused_where_it_does_not_fit(photos, tmp_pa
 def test_calibrations_by_the_same_camera_are_taken(photos, tmp_path, kind):
     result = run("stack", photos, tmp_path / "s.zarr", f"--{kind}", calibrated(kind, tmp_path))
     assert result.exit_code == 0, result.output
+
+
+def test_a_dark_frame_of_another_camera_is_no_one_s_black(tmp_path):
+    """Neither for a flat field nor for stray light nor for colour."""
+    write_dng(tmp_path / "dark.dng", grey(SIDE, 60, 9), camera="other camera")
+    write_dng(tmp_path / "card.dng", grey(SIDE, 30000, 8))
+    assert run("calibrate", "dark", tmp_path / "dark.dng", tmp_path / "dark.json").exit_code == 0
+    dark = ["--dark", tmp_path / "dark.json"]
+    boxes = ["--trap", "4,4,9,9", "--bright", "20,20,30,30"]
+    for words in (
+        ["flat", tmp_path / "card.dng", tmp_path / "f.json"],
+        ["glare", tmp_path / "card.dng", *boxes],
+    ):
+        result = run("calibrate", *words, *dark)
+        assert result.exit_code == 1, result.output
+        assert "is for camera impasto other camera, and these" in " ".join(result.output.split())

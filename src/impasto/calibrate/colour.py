@@ -131,7 +131,7 @@ def colour(
             problems.append(Problem(f"patch {name}", f"is clipped in {share:.1%} of its samples", do))
     raise_problems(CaptureError, problems)
     response = response_table(oecf, [shot])
-    black = dark_image(dark, [shot], response)
+    black = dark_image(dark, shot, response)
     rgb, _, _ = table.read(shot.linear(response) - black)
     if even is not None:
         level, _, _ = table.read(even.linear(response) - black)

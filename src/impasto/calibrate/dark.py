@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.calibrate.files import read_calibration, subject_of, write_calibration
-from impasto.calibrate.response_file import response_table
+from impasto.calibrate.response_file import mismatches, response_table
 from impasto.calibrate.shots import Shot, read_shot
-from impasto.calibrate.surface import smooth_surface
+from impasto.calibrate.surface import GRID, over_frame, smooth_surface
 from impasto.errors import CaptureError, Problem, raise_problems
 
 # More light than this is no dark frame, as a share of full scale.
@@ -86,31 +86,52 @@ def dark(
     return Dark(Path(out), level, noise, hot)
 
 
-def dark_image(
-    dark: str | PathLike[str] | None, shots: list[Shot], table: NDArray[np.float64] | None
+def dark_grid(
+    dark: str | PathLike[str] | None, shot: Shot, table: NDArray[np.float64] | None
 ) -> NDArray[np.float64]:
-    """Return the level of no light per channel, shape (C,), from a photograph or a calibration file.
+    """Return the level of no light on the grid of `surface`, from a photograph or a calibration file.
+
+    Parameters
+    ----------
+    dark : path or None
+        Without, the level is 0.
+    shot : Shot
+        A photograph that it is taken off.
+    table : ndarray of shape (codes, C) or None
+        The camera's response.
+
+    Returns
+    -------
+    ndarray of shape (rows, columns, C)
 
     Raises
     ------
     CaptureError
-        If it cannot be read, or is not for these photographs.
+        If it cannot be read, or is not for this photograph.
     """
-    channels = shots[0].codes.shape[2]
     if dark is None:
-        return np.zeros(channels)
+        return np.zeros((*GRID, shot.photograph.channels))
     path = Path(dark)
-    if path.suffix == ".json":
-        return np.array(read_calibration(path, "dark").content["level"])
-    shot = read_shot(path)
-    image = shot.linear(table)
-    problems = _lit(shot, image)
-    if shot.codes.shape != shots[0].codes.shape:
-        problems.append(
-            Problem(path.name, f"has another size than {shots[0].path.name}", "Export both alike")
-        )
-    raise_problems(CaptureError, problems)
-    return np.asarray(image.mean(axis=(0, 1), dtype=np.float64))
+    if path.suffix.lower() == ".json":
+        calibration = read_calibration(path, "dark")
+        problems = mismatches(path, calibration.subject, subject_of([shot], iso=True, size=True))
+        raise_problems(CaptureError, problems)
+        return np.array(calibration.content["grid"])
+    capped = read_shot(path)
+    if capped.layout != shot.layout:
+        what = f"has {capped.layout}, expected {shot.layout} as {shot.path.name}"
+        raise CaptureError(Problem(path.name, what, "Export both alike"))
+    image = capped.linear(table)
+    raise_problems(CaptureError, _lit(capped, image))
+    return smooth_surface(image)[0]
+
+
+def dark_image(
+    dark: str | PathLike[str] | None, shot: Shot, table: NDArray[np.float64] | None
+) -> NDArray[np.float32]:
+    """Return the same over the whole frame, ndarray of shape (H, W, C)."""
+    photograph = shot.photograph
+    return over_frame(dark_grid(dark, shot, table), photograph.height, photograph.width)
 
 
 def _lit(shot: Shot, image: NDArray[np.floating]) -> list[Problem]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from impasto.calibrate.dark import dark_image
+from impasto.calibrate.dark import dark_grid
 from impasto.calibrate.files import subject_of, write_calibration
 from impasto.calibrate.response_file import response_table
 from impasto.calibrate.shots import Shot, one_by_one, photographs_in
@@ -99,11 +99,11 @@ def flat(
     for shot in one_by_one(paths):
         if not seen:
             table = response_table(oecf, [shot])
-            black = dark_image(dark, [shot], table)
+            black = dark_grid(dark, shot, table)
         seen.append(shot.without_pixels)
-        image = shot.linear(table) - black
-        problems += _card_problems(shot, image)
-        surface, residual = smooth_surface(image)
+        surface, residual = smooth_surface(shot.linear(table))
+        surface -= black
+        problems += _card_problems(shot, float(surface.mean()))
         if file is not None:
             surface = surface / _fall_off(shot, file, one)[..., None]
         middle = surface[surface.shape[0] // 2, surface.shape[1] // 2]
@@ -129,13 +129,13 @@ def flat(
     return Flat(Path(out), () if one else tuple(grids), before, after, file is not None, tuple(notes))
 
 
-def _card_problems(shot: Shot, image: Array) -> list[Problem]:
+def _card_problems(shot: Shot, level: float) -> list[Problem]:
     clipped = float(shot.clipped.mean())
     if clipped > _CLIPPED:
         what = f"is clipped in {clipped:.1%} of its samples"
         return [Problem(shot.path.name, what, "Expose the card for less time")]
-    if float(image.mean()) < _DIM:
-        what = f"reads {image.mean():.2%} of full scale"
+    if level < _DIM:
+        what = f"reads {level:.2%} of full scale"
         return [
             Problem(shot.path.name, what, "Expose the card for longer, so that it reads half of full scale")
         ]

@@ -84,7 +84,7 @@ def glare(
             Problem(shot.path.name, "shows the bright card clipped", "Expose it for less time")
         )
     table = response_table(oecf, [shot])
-    image = shot.linear(table) - dark_image(dark, [shot], table)
+    image = shot.linear(table) - dark_image(dark, shot, table)
     in_trap, beside = box_mean(image, trap), box_mean(image, bright)
     share = in_trap / beside - trap_reflectance / bright_reflectance
     return Glare(share, in_trap, beside, bool(share.max() > _MUCH))

@@ -64,6 +64,17 @@ def smooth_surface(image: NDArray[np.floating]) -> tuple[Array, Array]:
     return np.stack(grid, axis=-1), np.array(residual)
 
 
+def over_frame(grid: Array, height: int, width: int) -> NDArray[np.float32]:
+    """Interpolate a grid (rows, columns, C) linearly over a frame, ndarray of shape (H, W, C)."""
+    surface = grid.astype(np.float32)
+    for axis, length in enumerate((height, width)):
+        place = np.linspace(0, grid.shape[axis] - 1, length, dtype=np.float32)
+        before = np.minimum(place.astype(int), grid.shape[axis] - 2)
+        share = np.expand_dims(place - before, [other for other in range(3) if other != axis])
+        surface = (1 - share) * surface.take(before, axis) + share * surface.take(before + 1, axis)
+    return surface
+
+
 def _noise(cells: Array) -> float:
     """Return the standard deviation of a cell's mean, from third differences, which smooth light lacks."""
     if min(cells.shape) < 5:
