@@ -31,8 +31,9 @@ class Header:
         Make and model of the camera, the lens, and the time of the photograph, as the camera noted them.
     orientation : int
         The EXIF orientation, 1 to 8; 1 is upright.
-    half_size : bool
-        Whether a raw file's mosaic is read as one pixel per red, two green and blue photosites.
+    whole_size : (int, int) or None
+        Width and height of a raw file whose mosaic is read at half size, as one pixel per red, two green and
+        blue photosites.
     remarks : tuple of str
         What is left out on reading, such as an alpha channel.
     """
@@ -51,8 +52,13 @@ class Header:
     lens: str | None = None
     taken: str | None = None
     orientation: int = 1
-    half_size: bool = False
+    whole_size: tuple[int, int] | None = None
     remarks: tuple[str, ...] = ()
+
+    @property
+    def half_size(self) -> bool:
+        """Whether a raw file is read at half size."""
+        return self.whole_size is not None
 
 
 class UnreadableError(Exception):

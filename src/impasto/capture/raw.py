@@ -176,7 +176,8 @@ def half_size(header: Header) -> Header:
     """Return the header of a raw file that is read at half size, which takes no interpolation."""
     height, width = ((side + 1) // 2 for side in (header.height, header.width))
     unit_rows = _WORKING_HEIGHTS * height
-    return replace(header, height=height, width=width, unit_rows=unit_rows, half_size=True)
+    whole_size = (header.width, header.height)
+    return replace(header, height=height, width=width, unit_rows=unit_rows, whole_size=whole_size)
 
 
 def _saturated(raw: RawPy, half_size: bool) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.uint8]]:

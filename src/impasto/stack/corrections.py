@@ -38,9 +38,12 @@ class Corrections:
     ----------
     files : dict of str to Calibration
         By kind; those that were given.
+    shift_scale : float
+        From pixels of the photographs whose shifts were measured to those that are stacked.
     """
 
     files: dict[str, Calibration] = field(default_factory=dict)
+    shift_scale: float = 1.0
 
     def content(self, kind: str) -> dict[str, Any] | None:
         """Return what a kind of calibration holds, None without one."""
@@ -85,7 +88,7 @@ class Corrections:
         if content is None or name not in content["corrected"]:
             return None
         columns, rows = content["shift_px"][name]
-        return float(columns), float(rows)
+        return float(columns) * self.shift_scale, float(rows) * self.shift_scale
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of the stack that follow from the calibration."""
@@ -173,7 +176,8 @@ def read_corrections(named: dict[str, Named], capture: Capture) -> Corrections:
             problems += error.problems
             continue
         problems += _differences(files[kind], capture)
-    corrections = Corrections(files)
+    scale = 0.5 if "steadiness" in files and _for_whole(files["steadiness"], capture.photographs[0]) else 1.0
+    corrections = Corrections(files, scale)
     if (flat := corrections.content("flat")) is not None:
         problems += _flat_problems(files["flat"], flat, capture)
     if (steadiness := corrections.content("steadiness")) is not None:
@@ -202,14 +206,22 @@ def _differences(calibration: Calibration, capture: Capture) -> list[Problem]:
     """Return a problem for each way in which the photographs are not those that a calibration is for."""
     problems = {}
     for photograph in capture.photographs:
-        subject = Subject(
-            photograph.camera, photograph.iso, photograph.f_number,
-            (photograph.width, photograph.height), photograph.channels,
-        )  # fmt: skip
+        size = (photograph.width, photograph.height)
+        if photograph.whole_size is not None and _for_whole(calibration, photograph):
+            size = photograph.whole_size
+        subject = Subject(photograph.camera, photograph.iso, photograph.f_number, size, photograph.channels)
         for difference in calibration.subject.differences(subject):
             do = "Calibrate with the settings of these photographs, or leave it out"
             problems[difference] = Problem(calibration.path.name, f"is for {difference}", do)
     return list(problems.values())
+
+
+def _for_whole(calibration: Calibration, photograph: Photograph) -> bool:
+    """Return whether a photograph is read at half the size that a calibration is for.
+
+    Surfaces over the frame hold for it all the same, and shifts count half as many pixels.
+    """
+    return photograph.half_size and calibration.subject.size == photograph.whole_size
 
 
 def _flat_problems(file: Calibration, flat: dict[str, Any], capture: Capture) -> list[Problem]:
