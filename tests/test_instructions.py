@@ -8,18 +8,27 @@ import numpy as np
 import pytest
 from benchmarks.problem import simulate
 from benchmarks.speed import fit_core
+from tests.test_residual import photographed
 
 from impasto import _core
+from impasto.fit.remainder import left_over
 
 _FIT = """
 import sys
 import numpy as np
 from benchmarks.problem import simulate
 from benchmarks.speed import fit_core
+from tests.test_instructions import codes
 from impasto import _core
 assert _core.instructions() == sys.argv[1]
-np.savez(sys.argv[2], **fit_core(simulate(4096)))
+np.savez(sys.argv[2], codes=codes(), **fit_core(simulate(4096)))
 """
+
+
+def codes():
+    """Return codes of what a model leaves over of photographs."""
+    encoder = np.random.default_rng(3).normal(scale=3e3, size=(18, 27)).astype(np.float32)
+    return left_over(*photographed(1200, 3), 0.004, encoder)
 
 
 @pytest.mark.parametrize("name", _core.available_instructions()[:-1])
@@ -40,3 +49,4 @@ def test_all_versions_of_the_core_agree(name, tmp_path):
     # Another rounding leads a pixel in ten thousand into another valley.
     change = np.abs(other["chi2_reduced"] / here["chi2_reduced"] - 1)
     assert np.count_nonzero(change > 2e-3) <= 0.001 * len(change)
+    assert np.abs(other["codes"].astype(int) - codes()).max() <= 1

@@ -248,15 +248,17 @@ def core_settings(lights):
 
 
 def test_rendering_of_a_relief(photographs):
-    rendered = _core.render(
-        MODEL,
-        photographs["normal"].astype(np.float32),
-        photographs["diffuse"].astype(np.float32),
-        (1 / (4 * photographs["c"] ** 2)).astype(np.float32)[:, None],
-        photographs["c"].astype(np.float32)[:, None],
-        None,
+    scene = {
+        "model": MODEL,
+        "normal": photographs["normal"].astype(np.float32),
+        "diffuse": photographs["diffuse"].astype(np.float32),
+        "specular": (1 / (4 * photographs["c"] ** 2)).astype(np.float32)[:, None],
+        "shape": photographs["c"].astype(np.float32)[:, None],
+        "ambient": None,
+        "view_tilt": None,
         **core_settings(photographs["lights"]),
-    )
+    }
+    rendered = _core.render(scene)
     difference = np.abs(rendered / photographs["radiance"] - 1)
     assert np.median(difference) < 1e-6
     assert difference.max() < 1e-3  # the two forms of G part at low lights

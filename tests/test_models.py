@@ -71,6 +71,7 @@ def render(model, normal, diffuse, specular, shape, ambient=None, *, light_direc
     settings = {
         "light_position_mm": np.full((lights, 3), np.nan),
         "light_intensity": np.ones((lights, channels)),
+        "view_tilt": None,
         "view_direction": np.array([0.0, 0.0, 1.0]),
         "camera_distance_mm": None,
         "position_mm": None,
@@ -79,19 +80,20 @@ def render(model, normal, diffuse, specular, shape, ambient=None, *, light_direc
         "fresnel": "facet",
     } | options
     entry = MODELS[reference.base_name(model)]
-    maps = (
-        np.asarray(normal),
-        np.asarray(diffuse),
-        np.reshape(specular, (pixels, -1))[:, : entry["lobes"]],
-        np.reshape(shape, (pixels, -1))[:, : len(entry["shape"])],
-    )
-    return _core.render(
-        model,
-        *(np.ascontiguousarray(a, np.float32) for a in maps),
-        None if ambient is None else np.ascontiguousarray(ambient, np.float32),
-        light_direction=np.ascontiguousarray(light_direction, float),
+    maps = {
+        "normal": normal,
+        "diffuse": diffuse,
+        "specular": np.reshape(specular, (pixels, -1))[:, : entry["lobes"]],
+        "shape": np.reshape(shape, (pixels, -1))[:, : len(entry["shape"])],
+    }
+    scene = {
+        "model": model,
+        **{name: np.ascontiguousarray(values, np.float32) for name, values in maps.items()},
+        "ambient": None if ambient is None else np.ascontiguousarray(ambient, np.float32),
+        "light_direction": np.ascontiguousarray(light_direction, float),
         **settings,
-    )
+    }
+    return _core.render(scene)
 
 
 def typical_shape(model):

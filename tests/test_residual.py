@@ -1,6 +1,8 @@
 """The residual term: closed forms against their definitions, fading, and what a fit with it gives."""
 
 import shutil
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import OpenImageIO as oiio
@@ -11,33 +13,35 @@ import impasto
 from impasto.errors import OptionError
 from impasto.fit import FitOptions
 from impasto.fit.light_process import LightProcess, compress, hull_of
-from impasto.fit.remainder import product
+from impasto.fit.remainder import left_over
 from impasto.fit.strength import find_strength
-from impasto.geometry import Lights, arm_direction, dome_direction
-from impasto.residual import ZERO, ResidualTerm, decode, encode, kernel
+from impasto.geometry import Camera, Lights, arm_direction, dome_direction
+from impasto.pixels import Pixels, pixel_positions_mm, render_pixels
+from impasto.residual import ZERO, ResidualTerm, encode, kernel
 from impasto.store import open_fit, open_stack
 
 RNG = np.random.default_rng(4)
 MODEL = "torrance-sparrow"
+OPTICS = {"index_of_refraction": 1.5, "fresnel": "facet"}
+CAMERA = Camera(np.array([0.0, 0.0, 1.0]))
 
 
-@pytest.mark.parametrize("shape", [(5000, 200, 18), (7, 3, 2), (3, 2000, 200), (0, 4, 2)])
-def test_a_product_in_pieces_is_the_product(shape):
-    pixels, count, components = shape
-    samples = RNG.normal(size=(pixels, count)).astype(np.float32)
-    table = RNG.normal(size=(components, count)).astype(np.float32).T
-    np.testing.assert_allclose(product(samples, table), samples @ table, rtol=1e-4, atol=1e-3)
+def lights(count=24, zenith_deg=70, rng=RNG):
+    zenith = np.arccos(rng.uniform(np.cos(np.radians(zenith_deg)), 1, count))
+    return dome_direction(zenith, rng.uniform(0, 2 * np.pi, count))
 
 
-def lights(count=24, zenith_deg=70):
-    zenith = np.arccos(RNG.uniform(np.cos(np.radians(zenith_deg)), 1, count))
-    return dome_direction(zenith, RNG.uniform(0, 2 * np.pi, count))
-
-
-def test_the_encoding_is_undone():
-    radiance = np.array([0.0, 1e-4, 0.3, 1.0, 80.0], np.float32)
-    np.testing.assert_allclose(decode(encode(radiance, 0.003), 0.003), radiance, rtol=1e-5, atol=1e-6)
-    assert encode([-1.0, np.nan], 0.003) == pytest.approx(0.0, abs=1e-8)
+def test_a_published_store_has_the_term_in_a_table():
+    pixels = flat(np.full((5, 3), 0.3))
+    term = plain_term(lights(20)) | {"weights": RNG.normal(size=(1, 3, 20)).tolist()}
+    table = np.linspace(-0.03, 0.03, 256)
+    codes = RNG.integers(0, 256, size=(5, 1))
+    published = replace(pixels, residual=codes.astype(np.uint8))
+    got = rendered(published, term | {"table": table.tolist()})
+    steps = np.rint(table[codes] / 1e-6) + ZERO
+    expected = rendered(replace(pixels, residual=steps.astype(np.uint16)), term | {"step": [1e-6]})
+    np.testing.assert_allclose(got, expected, rtol=1e-4)
+    assert np.ptp(got[0], axis=0).min() > 0.01
 
 
 def test_left_out_errors_are_those_of_processes_that_have_not_seen_the_light():
@@ -83,53 +87,134 @@ def test_the_hull_holds_its_lights_and_nothing_far_from_them(planar):
     np.testing.assert_allclose(np.linalg.norm(hull, axis=1), 1.0, atol=1e-6)
 
 
+def flat(diffuse, codes=None, **columns):
+    """Return matte pixels (P, C) that face the camera."""
+    count = len(diffuse)
+    none = np.empty((count, 0), np.float32)
+    settings = {
+        "attributes": {"model": "lambert", "light_rgb": [1.0] * diffuse.shape[1]} | OPTICS,
+        "size": (count, 1),
+        "row": np.arange(count),
+        "column": np.zeros(count, int),
+        "normal": np.tile(np.float32([0.0, 0.0, 1.0]), (count, 1)),
+        "diffuse": np.asarray(diffuse, np.float32),
+        "specular": none,
+        "shape": none,
+        "ambient": None,
+        "view_tilt": None,
+        "residual": codes,
+    }
+    return Pixels(**settings | columns)
+
+
+def rendered(pixels, term, under=None):
+    """Return pixels with a residual term under lights, by default from their normal."""
+    under = Lights(("up",), np.array([[0.0, 0.0, 1.0]])) if under is None else under
+    return render_pixels(replace(pixels, attributes={**pixels.attributes, "residual": term}), under, CAMERA)
+
+
 def test_the_term_fades_to_nothing_outside_the_hull():
     direction = lights(30, 40)
-    term = ResidualTerm(
-        direction, 0.5, RNG.normal(size=(4, 3, 30)), np.ones(4), 0.01, hull_of(direction), 0.17
-    )
-    assert term.share(direction) == pytest.approx(1.0)
+    found = plain_term(direction) | {"weights": RNG.normal(size=(1, 3, 30)).tolist(), "step": [1.0]}
+    assert ResidualTerm.of({"residual": found}).share(direction) == pytest.approx(1.0)
     low = dome_direction(np.radians([75.0]), [1.0])
-    assert term.share(low) == 0.0
-    radiance = np.full((1, 5, 3), 0.3, np.float32)
-    codes = np.full((5, 4), ZERO + 1, np.uint16)
-    term.add(radiance, codes, low, np.ones((1, 1, 3), np.float32))
-    assert (radiance == np.float32(0.3)).all()
-    term.add(radiance, codes, direction[:1], np.ones((1, 1, 3), np.float32))
-    assert (radiance != np.float32(0.3)).all()
+    assert ResidualTerm.of({"residual": found}).share(low) == 0.0
+    pixels = flat(np.full((5, 3), 0.3), np.full((5, 1), ZERO + 1, np.uint16))
+    for place, same in ((low, True), (direction[:1], False)):
+        under = Lights(("a",), place)
+        changed = rendered(pixels, found, under) != rendered(replace(pixels, residual=None), found, under)
+        assert changed.any() != same
 
 
 def test_added_as_docs_store_md_says():
     direction = lights(12)
-    weights, step = RNG.normal(size=(3, 3, 12)), np.array([0.01, 0.02, 0.005])
-    strength = RNG.normal(0.0, 0.2, size=(3, 12))
-    term = ResidualTerm(
-        direction,
-        0.4,
-        weights,
-        step,
-        0.004,
-        hull_of(direction),
-        0.17,
-        strength_length=0.6,
-        strength_weights=strength,
-    )
+    found = {
+        "components": 3,
+        "step": [0.01, 0.02, 0.005],
+        "toe": 0.004,
+        "direction": direction.tolist(),
+        "length": 0.4,
+        "weights": (weights := RNG.normal(size=(3, 3, 12))).tolist(),
+        "hull": hull_of(direction).tolist(),
+        "fade": 0.17,
+        "strength": {"length": 0.6, "weights": (strength := RNG.normal(0.0, 0.2, size=(3, 12))).tolist()},
+    }
     codes = RNG.integers(ZERO - 9, ZERO + 9, size=(7, 3)).astype(np.uint16)
-    light = direction[:2]
-    irradiance = np.array([[[1.0, 1.2, 0.8]], [[2.0, 2.0, 2.0]]], np.float32)
-    model = RNG.uniform(0.0, 1.0, size=(2, 7, 3)).astype(np.float32)
-    model[0, 3] = np.nan
-    got = model.copy()
-    term.add(got, codes, light, irradiance)
+    intensity = np.array([[1.0, 1.2, 0.8], [2.0, 2.0, 2.0]])
+    diffuse = RNG.uniform(0.0, 1.0, size=(7, 3))
+    diffuse[3] = np.nan
+    got = rendered(flat(diffuse, codes), found, Lights(("a", "b"), direction[:2], intensity=intensity))
     for place in np.ndindex(2, 7, 3):
         which, pixel, channel = place
-        near = np.exp(-np.square(light[which] - direction).sum(axis=1) / (2 * 0.4**2))
-        value = np.sqrt(model[place] / irradiance[which, 0, channel] + 0.004) - np.sqrt(0.004)
-        value += ((codes[pixel].astype(float) - ZERO) * step) @ (weights[:, channel] @ near)
-        expected = ((max(value, 0) + np.sqrt(0.004)) ** 2 - 0.004) * irradiance[which, 0, channel]
-        around = np.exp(-np.square(light[which] - direction).sum(axis=1) / (2 * 0.6**2))
+        near = np.exp(-np.square(direction[which] - direction).sum(axis=1) / (2 * 0.4**2))
+        value = np.sqrt(diffuse[pixel, channel] * direction[which, 2] + 0.004) - np.sqrt(0.004)
+        value += ((codes[pixel].astype(float) - ZERO) * found["step"]) @ (weights[:, channel] @ near)
+        expected = ((max(value, 0) + np.sqrt(0.004)) ** 2 - 0.004) * intensity[which, channel]
+        around = np.exp(-np.square(direction[which] - direction).sum(axis=1) / (2 * 0.6**2))
         expected *= np.exp(strength[channel] @ around)
         np.testing.assert_allclose(got[place], expected, rtol=2e-4, atol=1e-5)
+
+
+def photographed(count, channels, *, near=False, floats=False):
+    """Return a stack as `left_over` takes it, its values (L, N, C), pixels and lights; always the same."""
+    rng = np.random.default_rng(2)
+    direction = lights(9, rng=rng)
+    under = Lights(
+        tuple("abcdefghi"),
+        direction,
+        position_mm=direction * 300 if near else None,
+        intensity=rng.uniform(0.8, 1.2, size=(9, channels)),
+    )
+    camera = Camera(np.array([0.0, 0.0, 1.0]), mm_per_px=0.5 if near else None)
+    stack = SimpleNamespace(camera=camera, scale=1 / 50000, offset=-0.002, clip_level=np.full(channels, 0.8))
+    values = rng.integers(0, 50000, size=(9, count, channels)).astype(np.float32 if floats else np.uint16)
+    if floats:
+        values[2, 0] = np.nan
+    diffuse = rng.uniform(0.0, 1.0, size=(count, channels))
+    diffuse[count // 2] = np.nan
+    slope = np.array([0.0, 0.0, 1.0]) + rng.uniform(-0.3, 0.3, size=(count, 3))
+    normal = slope / np.linalg.norm(slope, axis=1, keepdims=True)
+    return stack, values, flat(diffuse, normal=normal.astype(np.float32)), under
+
+
+@pytest.mark.parametrize("near", [False, True])
+@pytest.mark.parametrize("floats", [False, True])
+@pytest.mark.parametrize(("count", "channels"), [(1, 3), (16, 1), (1200, 3), (37, 2)])
+def test_left_over_is_the_difference_of_encoded_radiances(count, channels, floats, near):
+    stack, values, pixels, under = photographed(count, channels, floats=floats, near=near)
+    rest = left_over(stack, values, pixels, under, 0.004)
+    irradiance = under.irradiance(pixel_positions_mm(pixels, stack.camera) if near else None)
+    measured = values.astype(np.float64) * stack.scale + stack.offset
+    model = render_pixels(pixels, under, stack.camera)
+    expected = encode(measured / irradiance, 0.004) - encode(model / irradiance, 0.004)
+    clipped = measured >= stack.clip_level
+    expected = np.where(clipped, np.maximum(expected, 0.0), expected)
+    expected[np.isnan(measured) | np.isnan(model)] = 0.0
+    assert rest.shape == (count, 9, channels)
+    np.testing.assert_allclose(rest, expected.transpose(1, 0, 2), atol=3e-6)
+    if count > 30:
+        assert clipped.any()
+        assert (rest[count // 2] == 0.0).all()
+
+
+@pytest.mark.parametrize("components", [1, 6, 18, 31])
+def test_codes_are_products_with_the_encoder_whatever_the_other_pixels(components):
+    stack, values, pixels, under = photographed(1200, 3)
+    encoder = RNG.normal(scale=3e3, size=(components, 27)).astype(np.float32)
+    encoder[0] *= 100.0  # beyond both ends of the codes
+    codes = left_over(stack, values, pixels, under, 0.004, encoder)
+    rest = left_over(stack, values, pixels, under, 0.004).reshape(1200, -1).astype(np.float64)
+    expected = np.clip(np.rint(rest @ encoder.T.astype(np.float64)), -ZERO, ZERO - 1) + ZERO
+    assert codes.dtype == np.uint16
+    assert np.abs(codes - expected).max() <= 1
+    assert (codes == expected).mean() > 0.98
+    assert (codes[600] == ZERO).all()
+    assert {0, 65535} <= set(codes[:, 0].tolist())
+    part = slice(333, 901)
+    alone = left_over(stack, values[:, part], pixels.select(part), under, 0.004, encoder)
+    np.testing.assert_array_equal(alone, codes[part])
+    columns = np.asfortranarray(encoder)
+    np.testing.assert_array_equal(left_over(stack, values, pixels, under, 0.004, columns), codes)
 
 
 def test_strengths_that_are_smooth_over_direction_are_told_to_lights_between():
@@ -155,16 +240,12 @@ def test_strengths_that_have_nothing_to_do_with_direction_are_not_told():
 def test_even_lights_are_as_bright_as_stated():
     direction = lights(30)
     strength = {"length": 0.4, "weights": RNG.normal(0.0, 0.1, (3, 30)).tolist()}
-    term = ResidualTerm.of({"residual": {**plain_term(direction), "strength": strength}})
     stated = Lights(("a", "b"), direction[:2], intensity=np.array([[1.0], [2.0]]))
-    model = np.array([0.3, 0.6], np.float32)[:, None, None] * np.ones((2, 4, 3), np.float32)
-    codes = np.full((4, 1), ZERO, np.uint16)
-    followed, even = model.copy(), model.copy()
-    term.add(followed, codes, stated.direction, stated.irradiance())
-    assert np.abs(followed / model - 1.0).max() > 0.05
-    found = term.even(stated)
-    even *= (found.intensity / stated.intensity)[:, None].astype(np.float32)
-    term.add(even, codes, found.direction, found.irradiance())
+    pixels = flat(np.full((4, 3), 0.3), np.full((4, 1), ZERO, np.uint16))
+    model = render_pixels(replace(pixels, residual=None), stated, CAMERA)
+    found = {**plain_term(direction), "strength": strength}
+    assert np.abs(rendered(pixels, found, stated) / model - 1.0).max() > 0.05
+    even = rendered(pixels, found, ResidualTerm.of({"residual": found}).even(stated))
     np.testing.assert_allclose(even, model, rtol=1e-4)
 
 

@@ -10,7 +10,8 @@ use crate::models::{Model, Optics, ShapeParameter};
 use crate::observations::Stack;
 use crate::paper::{PaperFit, Sample};
 use crate::record::{FitBlock, Layout};
-use crate::render::{Parameters, View, render_group};
+use crate::render::{self, Scene, Shader, Shading};
+use crate::residual::{LeftOver, Residual};
 use crate::slopes;
 use rayon::prelude::*;
 use std::sync::LazyLock;
@@ -156,29 +157,11 @@ macro_rules! dispatch {
                 dispatch!(@paper $room);
 
                 #[inline(never)]
-                fn render_block<const ISA: Isa>(
-                    parameters: &Parameters,
-                    view: &View,
-                    optics: &Optics,
-                    first: usize,
-                    radiance: &mut [f32],
-                ) {
+                pub fn shade<const ISA: Isa>(scene: &Scene, first: usize, shading: &mut Shading<ISA>) {
                     outlined::<ISA, _>(
                         #[inline(always)]
-                        || {
-                            for (group, radiance) in radiance.chunks_mut(LANES * view.intensity.len()).enumerate() {
-                                let first = first + group * LANES;
-                                render_group::<This, ISA, $room>(parameters, view, optics, first, radiance);
-                            }
-                        },
+                        || render::shade::<This, ISA, $room>(scene, first, shading),
                     )
-                }
-
-                pub fn render(parameters: &Parameters, view: &View, optics: &Optics, radiance: &mut [f32]) {
-                    let blocks = radiance.par_chunks_mut(BLOCK * view.intensity.len()).enumerate();
-                    with_instructions!(ISA => blocks.for_each(|(block, radiance)| {
-                        render_block::<ISA>(parameters, view, optics, block * BLOCK, radiance)
-                    }));
                 }
 
                 pub fn basis_slopes(view: &slopes::View, optics: &Optics) -> Vec<f64> {
@@ -229,13 +212,12 @@ macro_rules! dispatch {
             }
         }
 
-        /// Renders one light into `radiance`, (pixel, channel); `false` if no model has the name.
-        pub fn render(name: &str, parameters: &Parameters, view: &View, optics: &Optics, radiance: &mut [f32]) -> bool {
+        /// The shader of a model, if one has the name.
+        fn shader<const ISA: Isa>(name: &str) -> Option<Shader<ISA>> {
             match name {
-                $($name => $module::render(parameters, view, optics, radiance),)*
-                _ => return false,
+                $($name => Some($module::shade::<ISA>),)*
+                _ => None,
             }
-            true
         }
 
         /// The basis functions and their slopes; `None` if no model has the name.
@@ -294,3 +276,19 @@ macro_rules! dispatch {
     };
 }
 crate::for_each_model!(dispatch);
+
+/// Renders a tile into `radiance`, (light, pixel, channel); `None` if no model has the name.
+pub fn render(name: &str, scene: &Scene, residual: Option<&Residual>, radiance: &mut [f32]) -> Option<()> {
+    with_instructions!(ISA => render::render(shader::<ISA>(name)?, scene, residual, radiance));
+    Some(())
+}
+
+/// What a model leaves over of photographs, (pixel, light, channel); `None` if no model has the name.
+pub fn left_over(name: &str, found: &LeftOver) -> Option<Vec<f32>> {
+    with_instructions!(ISA => Some(found.samples::<ISA, MAX_CHANNELS>(shader(name)?)))
+}
+
+/// The same in codes, (pixel, component).
+pub fn codes(name: &str, found: &LeftOver, encoder: &[f32]) -> Option<Vec<u16>> {
+    with_instructions!(ISA => Some(found.codes::<ISA, MAX_CHANNELS>(shader(name)?, encoder)))
+}

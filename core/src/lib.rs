@@ -23,6 +23,7 @@ mod paper_shape;
 mod python;
 mod record;
 mod render;
+mod residual;
 mod robust;
 mod separable;
 mod slopes;

@@ -11,6 +11,50 @@ pub enum Samples<'a> {
     F32(&'a [f32]),
 }
 
+impl Samples<'_> {
+    /// The samples of one light at a group of pixels, per channel, as stored; of so many pixels and channels.
+    #[inline(always)]
+    pub fn gather<const ISA: Isa, const C: usize>(
+        &self,
+        pixels: usize,
+        channels: usize,
+        light: usize,
+        pixel: &[usize; LANES],
+    ) -> [Lane<ISA>; C] {
+        let first = light * pixels * channels;
+        match self {
+            Samples::U16(values) => per_channel(&values[first..], channels, pixel, f32::from),
+            Samples::F32(values) => per_channel(&values[first..], channels, pixel, |value| value),
+        }
+    }
+}
+
+#[inline(always)]
+fn per_channel<T: Copy, const ISA: Isa, const C: usize>(
+    values: &[T],
+    channels: usize,
+    pixel: &[usize; LANES],
+    number: impl Fn(T) -> f32,
+) -> [Lane<ISA>; C] {
+    let mut result = [Lane([0.0; LANES]); C];
+    // Side by side, as all groups but a tile's last are, and as many channels as there is room for: loops of known length.
+    if channels == C && pixel[LANES - 1] == pixel[0] + LANES - 1 {
+        for (i, values) in values[pixel[0] * C..(pixel[0] + LANES) * C].chunks_exact(C).enumerate() {
+            for k in 0..C {
+                result[k].0[i] = number(values[k]);
+            }
+        }
+        return result;
+    }
+    for i in 0..LANES {
+        let values = &values[pixel[i] * channels..(pixel[i] + 1) * channels];
+        for k in 0..channels {
+            result[k].0[i] = number(values[k]);
+        }
+    }
+    result
+}
+
 /// Standard deviation of a sample: variance = read² + photon · Y + (relative · Y)², in relative radiance.
 #[derive(Clone, Copy, Debug)]
 pub struct Noise {
@@ -62,45 +106,6 @@ impl Stack<'_> {
         let normal = self.normal?;
         let pixel = self.group(start);
         Some(array!(|axis| Lane(array!(|i| normal[3 * pixel[i] + axis]))))
-    }
-
-    /// The samples of one light at a group of pixels, per channel, as stored.
-    #[inline(always)]
-    fn stored<const ISA: Isa, const C: usize>(&self, light: usize, pixel: &[usize; LANES]) -> [Lane<ISA>; C] {
-        match self.samples {
-            Samples::U16(values) => self.per_channel(values, light, pixel, f32::from),
-            Samples::F32(values) => self.per_channel(values, light, pixel, |value| value),
-        }
-    }
-
-    #[inline(always)]
-    fn per_channel<T: Copy, const ISA: Isa, const C: usize>(
-        &self,
-        values: &[T],
-        light: usize,
-        pixel: &[usize; LANES],
-        number: impl Fn(T) -> f32,
-    ) -> [Lane<ISA>; C] {
-        let mut result = [Lane([0.0; LANES]); C];
-        let first = (light * self.pixels + pixel[0]) * self.channels;
-        // Side by side, as all groups but a tile's last are, and as many channels as there is room for: loops of known
-        // length.
-        if self.channels == C && pixel[LANES - 1] == pixel[0] + LANES - 1 {
-            for (i, values) in values[first..first + LANES * C].chunks_exact(C).enumerate() {
-                for k in 0..C {
-                    result[k].0[i] = number(values[k]);
-                }
-            }
-            return result;
-        }
-        for i in 0..LANES {
-            let first = (light * self.pixels + pixel[i]) * self.channels;
-            let values = &values[first..first + self.channels];
-            for k in 0..self.channels {
-                result[k].0[i] = number(values[k]);
-            }
-        }
-        result
     }
 }
 
@@ -185,7 +190,7 @@ impl<const ISA: Isa, const C: usize> Group<ISA, C> {
         self.usable_samples = zero;
         self.clipped = zero;
         for (light, observation) in self.observations.iter_mut().enumerate() {
-            let stored = stack.stored::<ISA, C>(light, &pixel);
+            let stored = stack.samples.gather::<ISA, C>(stack.pixels, stack.channels, light, &pixel);
             let mut left_out = LaneMask::NONE;
             if let Some(mask) = stack.sample_mask {
                 left_out = Lane::<ISA>(array!(|i| f32::from(mask[light * stack.pixels + pixel[i]]))).positive();

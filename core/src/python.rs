@@ -8,7 +8,8 @@ use crate::models::{FresnelAngle, Optics};
 use crate::observations::{Noise, Samples, Stack};
 use crate::paper::Sample;
 use crate::record::Layout;
-use crate::render::{Parameters, View};
+use crate::render::{Parameters, Scene};
+use crate::residual::{Codes, LeftOver, Residual};
 use crate::robust::Loss;
 use crate::slopes;
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -81,6 +82,29 @@ fn check(name: &str, got: usize, expected: usize) -> PyResult<()> {
     if got == expected { Ok(()) } else { Err(invalid(format!("{name} has {got} elements, expected {expected}"))) }
 }
 
+/// Samples as they are stored, of shape (L, N, C).
+#[derive(FromPyObject)]
+enum Photographs<'py> {
+    #[pyo3(annotation = "uint16 array of shape (L, N, C)")]
+    U16(PyReadonlyArray3<'py, u16>),
+    #[pyo3(annotation = "float32 array of shape (L, N, C)")]
+    F32(PyReadonlyArray3<'py, f32>),
+}
+
+impl Photographs<'_> {
+    fn parse(&self) -> PyResult<(Samples<'_>, [usize; 3])> {
+        let (samples, shape) = match self {
+            Photographs::U16(array) => (Samples::U16(array.as_slice()?), array.as_array().dim()),
+            Photographs::F32(array) => (Samples::F32(array.as_slice()?), array.as_array().dim()),
+        };
+        let (lights, pixels, channels) = shape;
+        if !(1..=dispatch::MAX_CHANNELS).contains(&channels) {
+            return Err(invalid(format!("radiance has {channels} channels, not 1 to {}", dispatch::MAX_CHANNELS)));
+        }
+        Ok((samples, [lights, pixels, channels]))
+    }
+}
+
 /// The names, shape parameters and properties of all models.
 #[pyfunction]
 fn models(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
@@ -123,7 +147,7 @@ fn instructions() -> &'static str {
 fn fit<'py>(
     py: Python<'py>,
     model: &str,
-    radiance: &Bound<'py, PyAny>,
+    radiance: Photographs<'py>,
     scale: f32,
     offset: f32,
     light_direction: PyReadonlyArray2<f64>,
@@ -148,17 +172,7 @@ fn fit<'py>(
     let (name, ambient) = parse_model(model)?;
     let optics = parse_optics(index, fresnel)?;
     let options = Options { optics, loss: parse_loss(loss, loss_scale)?, max_steps, ambient };
-    let as_u16 = radiance.extract::<PyReadonlyArray3<u16>>().ok();
-    let as_f32 = radiance.extract::<PyReadonlyArray3<f32>>().ok();
-    let (shape, samples) = match (&as_u16, &as_f32) {
-        (Some(array), _) => (array.as_array().dim(), Samples::U16(array.as_slice()?)),
-        (_, Some(array)) => (array.as_array().dim(), Samples::F32(array.as_slice()?)),
-        _ => return Err(invalid("radiance must be a uint16 or float32 array of shape (L, N, C)")),
-    };
-    let (lights, pixels, channels) = shape;
-    if !(1..=dispatch::MAX_CHANNELS).contains(&channels) {
-        return Err(invalid(format!("radiance has {channels} channels, not 1 to {}", dispatch::MAX_CHANNELS)));
-    }
+    let (samples, [lights, pixels, channels]) = radiance.parse()?;
     let places = parse_places(&light_direction, &light_position_mm)?;
     check("light_direction", places.len(), lights)?;
     check("light_intensity", light_intensity.len(), lights * channels)?;
@@ -228,73 +242,168 @@ fn into_dict(py: Python<'_>, layout: Layout, rows: Vec<f32>, status: Vec<u8>) ->
     Ok(dict)
 }
 
-/// Renders a tile under each light; see `impasto.render`.
-#[pyfunction]
-#[pyo3(signature = (model, normal, diffuse, specular, shape, ambient, *, view_tilt=None, light_direction,
-    light_position_mm, light_intensity, view_direction, camera_distance_mm, position_mm, light_rgb, index, fresnel))]
-#[allow(clippy::too_many_arguments)]
-fn render<'py>(
-    py: Python<'py>,
-    model: &str,
-    normal: PyReadonlyArray2<f32>,
-    diffuse: PyReadonlyArray2<f32>,
-    specular: PyReadonlyArray2<f32>,
-    shape: PyReadonlyArray2<f32>,
-    ambient: Option<PyReadonlyArray2<f32>>,
-    view_tilt: Option<PyReadonlyArray1<f32>>,
-    light_direction: PyReadonlyArray2<f64>,
-    light_position_mm: PyReadonlyArray2<f64>,
-    light_intensity: PyReadonlyArray2<f64>,
+/// Fitted pixels under lights, a dict of what `impasto.pixels.scene` says.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct SceneItems<'py> {
+    model: String,
+    normal: PyReadonlyArray2<'py, f32>,
+    diffuse: PyReadonlyArray2<'py, f32>,
+    specular: PyReadonlyArray2<'py, f32>,
+    shape: PyReadonlyArray2<'py, f32>,
+    ambient: Option<PyReadonlyArray2<'py, f32>>,
+    view_tilt: Option<PyReadonlyArray1<'py, f32>>,
+    light_direction: PyReadonlyArray2<'py, f64>,
+    light_position_mm: PyReadonlyArray2<'py, f64>,
+    light_intensity: PyReadonlyArray2<'py, f64>,
     view_direction: [f64; 3],
     camera_distance_mm: Option<f64>,
-    position_mm: Option<PyReadonlyArray2<f32>>,
+    position_mm: Option<PyReadonlyArray2<'py, f32>>,
     light_rgb: Vec<f64>,
     index: f64,
-    fresnel: &str,
-) -> PyResult<Bound<'py, PyAny>> {
-    let (name, _) = parse_model(model)?;
-    let entry = dispatch::entries().into_iter().find(|entry| entry.name == name).expect("parsed from this list");
-    let optics = parse_optics(index, fresnel)?;
-    let places = parse_places(&light_direction, &light_position_mm)?;
-    let channels = light_rgb.len();
-    let parameters = Parameters {
-        pixels: normal.as_array().nrows(),
-        normal: normal.as_slice()?,
-        diffuse: diffuse.as_slice()?,
-        specular: specular.as_slice()?,
-        shape: shape.as_slice()?,
-        ambient: ambient.as_ref().map_or(Ok(&[][..]), |array| array.as_slice())?,
-        view_tilt: view_tilt.as_ref().map_or(Ok(&[][..]), |array| array.as_slice())?,
-    };
-    let pixels = parameters.pixels;
-    check("normal", parameters.normal.len(), 3 * pixels)?;
-    check("diffuse", parameters.diffuse.len(), channels * pixels)?;
-    check("specular", parameters.specular.len(), entry.lobes * pixels)?;
-    check("shape", parameters.shape.len(), entry.shape.len() * pixels)?;
-    if !parameters.ambient.is_empty() {
-        check("ambient", parameters.ambient.len(), channels * pixels)?;
+    fresnel: String,
+}
+
+impl SceneItems<'_> {
+    fn parse(&self) -> PyResult<(&'static str, Scene<'_>)> {
+        let (name, _) = parse_model(&self.model)?;
+        let entry = dispatch::entries().into_iter().find(|entry| entry.name == name).expect("parsed from this list");
+        let parameters = Parameters {
+            pixels: self.normal.as_array().nrows(),
+            normal: self.normal.as_slice()?,
+            diffuse: self.diffuse.as_slice()?,
+            specular: self.specular.as_slice()?,
+            shape: self.shape.as_slice()?,
+            ambient: self.ambient.as_ref().map_or(Ok(&[][..]), |array| array.as_slice())?,
+            view_tilt: self.view_tilt.as_ref().map_or(Ok(&[][..]), |array| array.as_slice())?,
+        };
+        let scene = Scene {
+            parameters,
+            channels: self.light_rgb.len(),
+            lights: parse_places(&self.light_direction, &self.light_position_mm)?,
+            intensity: self.light_intensity.as_array().iter().map(|&x| x as f32).collect(),
+            camera: parse_camera(self.view_direction, self.camera_distance_mm),
+            colour: self.light_rgb.clone(),
+            position_mm: self.position_mm.as_ref().map(|array| array.as_slice()).transpose()?,
+            optics: parse_optics(self.index, &self.fresnel)?,
+        };
+        let (pixels, channels) = (parameters.pixels, scene.channels);
+        check("normal", parameters.normal.len(), 3 * pixels)?;
+        check("diffuse", parameters.diffuse.len(), channels * pixels)?;
+        check("specular", parameters.specular.len(), entry.lobes * pixels)?;
+        check("shape", parameters.shape.len(), entry.shape.len() * pixels)?;
+        if !parameters.ambient.is_empty() {
+            check("ambient", parameters.ambient.len(), channels * pixels)?;
+        }
+        if !parameters.view_tilt.is_empty() {
+            check("view_tilt", parameters.view_tilt.len(), pixels)?;
+        }
+        check("light_intensity", scene.intensity.len(), scene.lights.len() * channels)?;
+        if scene.near() {
+            check("position_mm", scene.position_mm.map_or(0, <[f32]>::len), 2 * pixels)?;
+        }
+        Ok((name, scene))
     }
-    if !parameters.view_tilt.is_empty() {
-        check("view_tilt", parameters.view_tilt.len(), pixels)?;
-    }
-    check("light_intensity", light_intensity.len(), places.len() * channels)?;
-    let intensity: Vec<f32> = light_intensity.as_array().iter().map(|&x| x as f32).collect();
-    let camera = parse_camera(view_direction, camera_distance_mm);
-    let position_mm = position_mm.as_ref().map(|array| array.as_slice()).transpose()?;
-    if camera.near() || places.iter().any(Place::near) {
-        check("position_mm", position_mm.map_or(0, <[f32]>::len), 2 * pixels)?;
-    }
-    let mut radiance = vec![0.0; places.len() * pixels * channels];
-    if pixels > 0 {
-        py.detach(|| {
-            for (light, frame) in radiance.chunks_mut(pixels * channels).enumerate() {
-                let intensity = &intensity[light * channels..(light + 1) * channels];
-                let view = View { light: places[light], camera, intensity, colour: &light_rgb, position_mm };
-                dispatch::render(name, &parameters, &view, &optics, frame);
+}
+
+/// A residual term under the lights of a scene; see `impasto.residual.ResidualTerm.under`.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct ResidualItems<'py> {
+    codes: CodeItems<'py>,
+    table: Option<PyReadonlyArray1<'py, f32>>,
+    basis: PyReadonlyArray3<'py, f32>,
+    strength: PyReadonlyArray2<'py, f32>,
+    toe: f32,
+}
+
+#[derive(FromPyObject)]
+enum CodeItems<'py> {
+    #[pyo3(annotation = "uint16 array of shape (N, K)")]
+    U16(PyReadonlyArray2<'py, u16>),
+    #[pyo3(annotation = "uint8 array of shape (N, K)")]
+    U8(PyReadonlyArray2<'py, u8>),
+}
+
+impl ResidualItems<'_> {
+    fn parse(&self, scene: &Scene) -> PyResult<Residual<'_>> {
+        let codes = match (&self.codes, &self.table) {
+            (CodeItems::U16(codes), None) => Codes::U16(codes.as_slice()?),
+            (CodeItems::U8(codes), Some(table)) => {
+                check("table", table.len(), 256)?;
+                Codes::U8(codes.as_slice()?, table.as_slice()?)
             }
-        });
+            _ => return Err(invalid("codes must be uint16, or uint8 with a table")),
+        };
+        let components = self.basis.shape()[2];
+        let found = match codes {
+            Codes::U16(codes) => codes.len(),
+            Codes::U8(codes, _) => codes.len(),
+        };
+        check("codes", found, scene.parameters.pixels * components)?;
+        check("basis", self.basis.len(), scene.intensity.len() * components)?;
+        check("strength", self.strength.len(), scene.intensity.len())?;
+        Ok(Residual {
+            codes,
+            components,
+            basis: self.basis.as_slice()?,
+            strength: self.strength.as_slice()?,
+            toe: self.toe,
+        })
     }
-    Ok(radiance.into_pyarray(py).reshape([places.len(), pixels, channels])?.into_any())
+}
+
+/// Renders a tile under each light, with what the model leaves over where `residual` says it; see `impasto.render`.
+#[pyfunction]
+#[pyo3(signature = (scene, residual=None))]
+fn render<'py>(
+    py: Python<'py>,
+    scene: SceneItems<'py>,
+    residual: Option<ResidualItems<'py>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (name, scene) = scene.parse()?;
+    let residual = residual.as_ref().map(|residual| residual.parse(&scene)).transpose()?;
+    let shape = [scene.lights.len(), scene.parameters.pixels, scene.channels];
+    let mut radiance = vec![0.0; shape.iter().product()];
+    if !radiance.is_empty() {
+        py.detach(|| dispatch::render(name, &scene, residual.as_ref(), &mut radiance)).expect("parsed from the list");
+    }
+    Ok(radiance.into_pyarray(py).reshape(shape)?.into_any())
+}
+
+/// What a model leaves over of photographs, (N, L, C), or its codes by an encoder (K, L * C), (N, K); see
+/// `impasto.fit.remainder`.
+#[pyfunction]
+#[pyo3(signature = (scene, radiance, *, scale, offset, clip_level, toe, encoder=None))]
+#[allow(clippy::too_many_arguments)]
+fn left_over<'py>(
+    py: Python<'py>,
+    scene: SceneItems<'py>,
+    radiance: Photographs<'py>,
+    scale: f32,
+    offset: f32,
+    clip_level: Vec<f64>,
+    toe: f32,
+    encoder: Option<PyReadonlyArray2<'py, f32>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (name, scene) = scene.parse()?;
+    let (samples, shape) = radiance.parse()?;
+    let [lights, pixels, channels] = shape;
+    if shape != [scene.lights.len(), scene.parameters.pixels, scene.channels] {
+        return Err(invalid("radiance and the scene differ in lights, pixels or channels"));
+    }
+    check("clip_level", clip_level.len(), channels)?;
+    let clip_level: Vec<f32> = clip_level.iter().map(|&x| x as f32).collect();
+    let found = LeftOver { scene: &scene, samples, scale, offset, clip_level: &clip_level, toe };
+    let Some(encoder) = encoder else {
+        let rest = py.detach(|| dispatch::left_over(name, &found)).expect("parsed from the list");
+        return Ok(rest.into_pyarray(py).reshape([pixels, lights, channels])?.into_any());
+    };
+    check("encoder", encoder.len(), encoder.shape()[0] * lights * channels)?;
+    let components = encoder.shape()[0];
+    let encoder = encoder.as_slice()?;
+    let codes = py.detach(|| dispatch::codes(name, &found, encoder)).expect("parsed from the list");
+    Ok(codes.into_pyarray(py).reshape([pixels, components])?.into_any())
 }
 
 /// Basis values of a model in f64: one row (diffuse, lobe, …) for each row of directions and shapes.
@@ -441,5 +550,5 @@ fn parse_grid<'a>(grid: &'a PyReadonlyArray3<'_, f32>) -> PyResult<Grid<'a>> {
 #[pymodule]
 mod _core {
     #[pymodule_export]
-    use super::{available_instructions, basis, basis_slopes, correct, fit, instructions, models, render};
+    use super::{available_instructions, basis, basis_slopes, correct, fit, instructions, left_over, models, render};
 }

@@ -31,25 +31,17 @@ def fit(
     paper: tuple[float, float, bool, tuple[float, float, float] | None] | None = None,
     normal: NDArray[np.float32] | None = None,
 ) -> dict[str, NDArray[Any]]: ...
-def render(
-    model: str,
-    normal: NDArray[np.float32],
-    diffuse: NDArray[np.float32],
-    specular: NDArray[np.float32],
-    shape: NDArray[np.float32],
-    ambient: NDArray[np.float32] | None,
+def render(scene: dict[str, Any], residual: dict[str, Any] | None = None) -> NDArray[np.float32]: ...
+def left_over(
+    scene: dict[str, Any],
+    radiance: NDArray[np.uint16] | NDArray[np.float32],
     *,
-    view_tilt: NDArray[np.float32] | None = None,
-    light_direction: NDArray[np.float64],
-    light_position_mm: NDArray[np.float64],
-    light_intensity: NDArray[np.float64],
-    view_direction: NDArray[np.float64],
-    camera_distance_mm: float | None,
-    position_mm: NDArray[np.float32] | None,
-    light_rgb: NDArray[np.float64],
-    index: float,
-    fresnel: str,
-) -> NDArray[np.float32]: ...
+    scale: float,
+    offset: float,
+    clip_level: NDArray[np.float64],
+    toe: float,
+    encoder: NDArray[np.float32] | None = None,
+) -> NDArray[Any]: ...
 def basis(
     model: str,
     normal: NDArray[np.float64],

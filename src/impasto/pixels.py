@@ -81,13 +81,12 @@ class Pixels:
     @property
     def missing(self) -> NDArray[np.bool_]:
         """Which pixels have no fit."""
-        return np.logical_not(np.isfinite(self.normal).all(axis=1))
+        return ~_finite(self.normal)
 
     @property
     def matte(self) -> NDArray[np.bool_]:
         """Which pixels have a fit, but a highlight that the photographs do not tell."""
-        seen = np.isfinite(self.specular).all(axis=1) & np.isfinite(self.shape).all(axis=1)
-        return ~self.missing & ~seen
+        return ~self.missing & ~(_finite(self.specular) & _finite(self.shape))
 
     @property
     def whole(self) -> NDArray[np.bool_]:
@@ -106,6 +105,14 @@ class Pixels:
     def without_highlights(self) -> Pixels:
         """Return the pixels with their diffuse and ambient terms alone."""
         return replace(self, specular=np.zeros_like(self.specular))
+
+
+def _finite(values: Map) -> NDArray[np.bool_]:
+    """Return which rows are finite, column by column: along rows so short, numpy is slow."""
+    result = np.ones(len(values), bool)
+    for column in values.T:
+        result &= np.isfinite(column)
+    return result
 
 
 def join_pixels(parts: Sequence[Pixels]) -> Pixels:
@@ -149,8 +156,9 @@ def read_pixels(fit: Fit, rows: slice, columns: slice, *, residual: bool = False
     names += ["residual"] if residual and "residual" in fit.names else []
     maps = fit.read(rows, columns, names)
     height, width = maps["normal"].shape[:2]
-    row, column = np.divmod(np.arange(height * width), width)
-    return pixels_of_maps(fit.attributes, fit.shape, row + rows.start, column + columns.start, maps)
+    row = np.repeat(np.arange(rows.start, rows.start + height), width)
+    column = np.tile(np.arange(columns.start, columns.start + width), height)
+    return pixels_of_maps(fit.attributes, fit.shape, row, column, maps)
 
 
 def pixels_of_maps(
@@ -194,6 +202,44 @@ def pixels_of_maps(
     )
 
 
+def scene(pixels: Pixels, lights: Lights, camera: Camera) -> dict[str, Any]:
+    """Return pixels under lights as the core takes them.
+
+    Raises
+    ------
+    OptionError
+        If a light or the camera is near, and the size of a pixel is not known.
+    """
+    normal, position, arm_azimuth = pixels.normal, None, 0.0
+    if lights.near or camera.distance_mm is not None:
+        position = pixel_positions_mm(pixels, camera)
+    if pixels.view_tilt is not None:
+        arm_azimuth = np.radians(pixels.attributes["sample"]["arm_azimuth_deg"])
+        normal = turn_about_z(normal, -arm_azimuth).astype(np.float32)
+        if position is not None:
+            turned = turn_about_z(np.pad(position, ((0, 0), (0, 1))), -arm_azimuth)
+            position = turned[:, :2].astype(np.float32)
+    channels = pixels.diffuse.shape[1]
+    return {
+        "model": pixels.model.name,
+        "normal": normal,
+        "diffuse": pixels.diffuse,
+        "specular": pixels.specular,
+        "shape": pixels.shape,
+        "ambient": pixels.ambient,
+        "view_tilt": pixels.view_tilt,
+        "light_direction": turn_about_z(lights.direction, -arm_azimuth),
+        "light_position_mm": turn_about_z(lights.position_mm, -arm_azimuth),
+        "light_intensity": np.broadcast_to(lights.intensity, (len(lights), channels)),
+        "view_direction": camera.view_direction,
+        "camera_distance_mm": camera.distance_mm,
+        "position_mm": position,
+        "light_rgb": pixels.light_rgb,
+        "index": pixels.attributes["index_of_refraction"],
+        "fresnel": pixels.attributes["fresnel"],
+    }
+
+
 def render_pixels(pixels: Pixels, lights: Lights, camera: Camera) -> NDArray[np.float32]:
     """Return the relative radiance of pixels under lights.
 
@@ -217,42 +263,11 @@ def render_pixels(pixels: Pixels, lights: Lights, camera: Camera) -> NDArray[np.
     OptionError
         If a light or the camera is near, and the size of a pixel is not known.
     """
-    matte = pixels.matte[:, None]
-    normal, position = pixels.normal, None
-    view_tilt, arm_azimuth = pixels.view_tilt, 0.0
-    if lights.near or camera.distance_mm is not None:
-        position = pixel_positions_mm(pixels, camera)
-    if view_tilt is not None:
-        arm_azimuth = np.radians(pixels.attributes["sample"]["arm_azimuth_deg"])
-        view_tilt = np.where(matte[:, 0], np.float32(0.0), view_tilt)
-        normal = turn_about_z(normal, -arm_azimuth).astype(np.float32)
-        if position is not None:
-            turned = turn_about_z(np.pad(position, ((0, 0), (0, 1))), -arm_azimuth)
-            position = turned[:, :2].astype(np.float32)
-    channels = pixels.diffuse.shape[1]
-    radiance: NDArray[np.float32] = _core.render(
-        pixels.model.name,
-        normal,
-        pixels.diffuse,
-        np.where(matte, np.float32(0.0), pixels.specular),
-        # Any shape will do for a lobe of no magnitude that is within the range of every parameter.
-        np.where(matte, np.float32(0.5), pixels.shape),
-        pixels.ambient,
-        view_tilt=view_tilt,
-        light_direction=turn_about_z(lights.direction, -arm_azimuth),
-        light_position_mm=turn_about_z(lights.position_mm, -arm_azimuth),
-        light_intensity=np.ascontiguousarray(np.broadcast_to(lights.intensity, (len(lights), channels))),
-        view_direction=camera.view_direction,
-        camera_distance_mm=camera.distance_mm,
-        position_mm=position,
-        light_rgb=pixels.light_rgb,
-        index=pixels.attributes["index_of_refraction"],
-        fresnel=pixels.attributes["fresnel"],
-    )
     term = None if pixels.residual is None else ResidualTerm.of(pixels.attributes)
-    if term is not None and pixels.residual is not None:
-        irradiance = lights.irradiance(None if position is None else pixel_positions_mm(pixels, camera))
-        term.add(radiance, pixels.residual, lights.direction, irradiance)
+    residual = None
+    if term is not None and (under := term.under(lights.direction)):
+        residual = {"codes": pixels.residual, **under}
+    radiance: NDArray[np.float32] = _core.render(scene(pixels, lights, camera), residual)
     return radiance
 
 

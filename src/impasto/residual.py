@@ -5,9 +5,7 @@ docs/store.md specifies the numbers; why they are what they are says docs/decisi
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -37,15 +35,6 @@ def encode(radiance: ArrayLike, toe: float) -> Values:
     np.sqrt(values, out=values)
     values -= np.float32(np.sqrt(toe))
     return values
-
-
-def decode(values: Values, toe: float) -> Values:
-    """Return the radiance of encoded values (...), the inverse of `encode`; what is below 0 counts as 0."""
-    radiance = np.maximum(values, np.float32(0.0))
-    radiance += np.float32(np.sqrt(toe))
-    np.square(radiance, out=radiance)
-    radiance -= np.float32(toe)
-    return radiance
 
 
 def kernel(first: ArrayLike, second: ArrayLike, length: float) -> Array:
@@ -149,50 +138,15 @@ class ResidualTerm:
         """Return lights under which renderings are as bright as under `lights` of the strength stated."""
         return replace(lights, intensity=lights.intensity / self.strength(lights.direction))
 
-    def coefficients(self, codes: NDArray[np.unsignedinteger]) -> Values:
-        """Return the coefficients of codes (..., K), as multiples of `step`."""
-        if self.table is not None:
-            published: Values = self.table[codes]
-            return published
-        values: Values = codes.astype(np.float32)
-        values -= np.float32(ZERO)
-        return values
-
-    def add(
-        self, radiance: Values, codes: NDArray[np.unsignedinteger], direction: ArrayLike, irradiance: Values
-    ) -> None:
-        """Add the term to the radiance of pixels, in place.
-
-        Parameters
-        ----------
-        radiance : ndarray of shape (L, P, C), float32
-            As the model gives it; NaN stays NaN.
-        codes : ndarray of shape (P, K), uint16, of a published store uint8
-        direction : ndarray of shape (L, 3)
-            Of the lights.
-        irradiance : ndarray of shape (L, P or 1, C), float32
-            Of the lights at the pixels: intensity times fall-off.
-        """
+    def under(self, direction: ArrayLike) -> dict[str, Any]:
+        """Return what the core needs besides the codes to add the term at directions (L, 3), if anything."""
         basis = self.basis(direction) * self.step[:, None]
-        strength = self.strength(direction)[:, None].astype(np.float32)
-        lights, pixels, channels = radiance.shape
-        if not lights or not (basis.any() or np.any(strength != 1.0)):
-            return
-        table = basis.transpose(1, 0, 2).reshape(self.components, -1).astype(np.float32)
-        # Blocks that stay in the processor's cache, on all processors.
-        rows = max(256, 262144 // (lights * channels + self.components))
-
-        def add_to(first: int) -> None:
-            part = slice(first, first + rows)
-            added = (self.coefficients(codes[part]) @ table).reshape(-1, lights, channels).transpose(1, 0, 2)
-            share = irradiance if irradiance.shape[1] == 1 else irradiance[:, part]
-            dark = ~(share > 0.0)
-            values = encode(radiance[:, part] / np.where(dark, np.float32(1.0), share), self.toe)
-            values += added
-            result = decode(values, self.toe)
-            with np.errstate(over="ignore"):  # the narrowest lobes reach the largest numbers that there are
-                result *= share * strength
-            np.copyto(radiance[:, part], result, where=np.isfinite(radiance[:, part]) & ~dark)
-
-        with ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="residual") as pool:
-            list(pool.map(add_to, range(0, pixels, rows)))
+        strength = self.strength(direction)
+        if not (basis.any() or np.any(strength != 1.0)):
+            return {}
+        return {
+            "table": self.table,
+            "basis": np.ascontiguousarray(basis.transpose(0, 2, 1), np.float32),
+            "strength": np.ascontiguousarray(np.broadcast_to(strength, basis[:, 0].shape), np.float32),
+            "toe": self.toe,
+        }

@@ -16,7 +16,6 @@ from impasto.fit.procedure import Findings, FitOptions
 from impasto.fit.remainder import (
     Remainder,
     find_remainder,
-    in_blocks,
     left_out_db,
     left_over,
     usual_toe,
@@ -158,13 +157,9 @@ class Joint:
         remainder = self._remainder
         if remainder is not None:
             pixels = self.pixels(maps, row, column)
-            lights = self._selected
-
-            def codes(part: slice) -> NDArray[np.uint16]:
-                rest = self.left_over(values[:, part], pixels.select(part), lights, remainder.toe)
-                return remainder.codes(rest)
-
-            maps[stores.RESIDUAL] = in_blocks(len(pixels), codes)
+            maps[stores.RESIDUAL] = left_over(
+                self._stack, values, pixels, self._selected, remainder.toe, remainder.encoder
+            )
         return maps
 
     def fit_pixels(
@@ -208,12 +203,7 @@ class Joint:
         self, values: NDArray[Any], pixels: Pixels, lights: Lights, toe: float
     ) -> NDArray[np.float32]:
         """Return what the model leaves over of stored values (L, N, C); see `remainder.left_over`."""
-        measured = self.measured(values)
-        position = None
-        if self._near and self._camera.mm_per_px is not None:
-            position = position_mm(pixels.row, pixels.column, *pixels.size, self._camera.mm_per_px)
-        irradiance = lights.irradiance(position)
-        return left_over(measured, self.render(pixels, lights), self.clipped(measured), irradiance, toe)
+        return left_over(self._stack, values, pixels, lights, toe)
 
 
 @dataclass(frozen=True)
