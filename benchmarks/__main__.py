@@ -17,6 +17,11 @@ from benchmarks.report import Row, write
 
 SCIPY_BAR = 800
 WHOLE_BAR = 1.4
+# Of a fit with a residual and self-calibration over one without.
+RESIDUAL_BAR = 2.0
+# Of a rendering with a residual of 18 components, read from the store: 4 Mpx.
+FRAME_BAR_S = 0.5
+FRAME_BAR_PX = 1 << 22
 MEMORY_BAR_GB = 1.5
 RAW_BAR = 1.3
 RAW_MEMORY_BAR_GB = 2.0
@@ -115,6 +120,14 @@ def whole_rows(folder: Path, sizes: list[tuple[int, int]]) -> list[Row]:
             Row(f"{title}: decoding alone, s", measured["decode_alone_s"]),
             Row(f"{title}: fit from memory alone, s", measured["fit_alone_s"]),
             Row(f"{title}: whole over both alone", measured["ratio"], WHOLE_BAR),
+            Row(f"{title}: fit with residual and self-calibration, s", measured["residual"]["wall_s"]),
+            Row(f"{title}: that over the fit without", measured["residual_ratio"], RESIDUAL_BAR),
+            Row(
+                f"{title}: frame with residual, s",
+                measured["frame_s"],
+                FRAME_BAR_S * max(1.0, capture.pixels / FRAME_BAR_PX),
+                note="from the store to radiance under one light",
+            ),
             Row(f"{title}: peak memory, GB", measured["peak_gb"], MEMORY_BAR_GB),
             Row(f"{title}: report, s", measured["report"]["wall_s"], REPORT_BAR_S),
         ]

@@ -1,6 +1,7 @@
 """The whole way from photographs to maps, against what cannot be avoided: decoding and fitting, each alone.
 
-`python -m benchmarks.whole decode|memory FOLDER` measures one of the two floors and prints seconds.
+`python -m benchmarks.whole decode|memory FOLDER` measures one of the two floors, `frame STORE` a rendering
+from a store; each prints seconds.
 """
 
 from __future__ import annotations
@@ -62,33 +63,38 @@ def impasto(*arguments: str) -> dict[str, float]:
 
 
 def measure(capture: Capture, store: Path) -> dict[str, Any]:
-    """Time `impasto stack` and `impasto fit` on a capture, and the two floors."""
+    """Time the way from a capture to maps, without and with a residual, a rendering, and the two floors."""
     shutil.rmtree(store, ignore_errors=True)
     # As it lies after a first use, or in an installed package.
     compileall.compile_dir(Path(find_spec("impasto").origin).parent, quiet=1)
-    floors = {what: _floor(what, capture.folder) for what in ("decode", "memory")}
+    floors = {what: _alone(what, capture.folder) for what in ("decode", "memory")}
     fit_alone = floors["memory"]["seconds"] * capture.pixels / floors["memory"]["pixels"]
     os.sync()  # writing the photographs is not part of the way
     stack = impasto("stack", str(capture.folder), str(store))
     fit = impasto("fit", str(store), "--model", MODEL)
     report = impasto("report", str(store), str(store.with_suffix(".html")))
+    residual = impasto("fit", str(store), "--model", MODEL, "--residual", "--overwrite")
+    frame = _alone("frame", store)
     alone = floors["decode"]["seconds"] + fit_alone
     return {
         "megapixels": capture.pixels / 1e6,
         "photographs": len(capture.files),
         "stack": stack,
         "fit": fit,
+        "residual": residual,
+        "residual_ratio": residual["wall_s"] / fit["wall_s"],
+        "frame_s": frame["seconds"],
         "report": report,
         "decode_alone_s": floors["decode"]["seconds"],
         "fit_alone_s": fit_alone,
         "ratio": (stack["wall_s"] + fit["wall_s"]) / alone,
-        "peak_gb": max(stack["peak_gb"], fit["peak_gb"]),
+        "peak_gb": max(run["peak_gb"] for run in (stack, fit, residual)),
     }
 
 
-def _floor(what: str, folder: Path) -> dict[str, float]:
+def _alone(what: str, path: Path) -> dict[str, float]:
     """Return the faster of two runs, each in a process of its own."""
-    command = [sys.executable, "-m", "benchmarks.whole", what, str(folder)]
+    command = [sys.executable, "-m", "benchmarks.whole", what, str(path)]
     runs = [subprocess.run(command, check=True, capture_output=True, text=True) for _ in range(2)]
     return min((json.loads(run.stdout) for run in runs), key=lambda result: result["seconds"])
 
@@ -138,6 +144,27 @@ def _fit_memory(files: list[Path]) -> dict[str, float]:
     return {"seconds": time.perf_counter() - started, "pixels": pixels}
 
 
+def _frame(store: Path) -> dict[str, float]:
+    """Render one light from the store, with what the model leaves over; once more than is timed."""
+    from impasto.geometry import Lights, dome_direction
+    from impasto.render import render_bands
+    from impasto.store import open_fit, open_stack
+
+    fit, camera = open_fit(store, MODEL), open_stack(store).camera
+    light = Lights(("between",), dome_direction(np.radians([30.0]), np.radians([45.0])))
+    seconds = []
+    for _ in range(4):
+        started = time.perf_counter()
+        for _ in render_bands(fit, light, camera):
+            pass
+        seconds.append(time.perf_counter() - started)
+    return {"seconds": float(np.median(seconds[1:])), "pixels": fit.shape[0] * fit.shape[1]}
+
+
 if __name__ == "__main__":
-    photographs = sorted(Path(sys.argv[2]).glob("*.tif"))
-    print(json.dumps({"decode": _decode, "memory": _fit_memory}[sys.argv[1]](photographs)))
+    what, path = sys.argv[1], Path(sys.argv[2])
+    if what == "frame":
+        result = _frame(path)
+    else:
+        result = {"decode": _decode, "memory": _fit_memory}[what](sorted(path.glob("*.tif")))
+    print(json.dumps(result))
