@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import gc
+import os
 import sys
 from contextlib import suppress
 from importlib import import_module
@@ -40,6 +42,10 @@ _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 def main() -> None:
     """Run the command line."""
     _keep_freed_memory()
+    # Threads of OpenBLAS that have nothing to do would turn in circles for 20 ms each time before they sleep.
+    os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
+    # Loading makes many objects that stay, among which there is no rubbish to look for.
+    gc.set_threshold(100_000, 50, 50)
     # All subcommands take a while to load; the one that is called is enough.
     called = next(iter(sys.argv[1:]), "")
     import_module(f"{__name__}.{called if called in COMMANDS else 'commands'}")

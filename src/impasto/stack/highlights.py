@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_STEPS = 8
+_STEPS = 7
 
 # Samples of fewer lights than this do not show what is diffuse: three unknowns, and some to disagree.
 _LEAST_LIGHTS = 6
@@ -72,15 +72,15 @@ def separate(radiance: Array, usable: NDArray[np.bool_], light: Array, read_nois
     typical = np.sort(np.where(usable, brightness, -np.inf), axis=1)[pixels, middle]
     typical = np.where(np.isfinite(typical), typical, 0.0)[:, None]
     weight = usable.astype(np.float64)
-    for step in range(_STEPS):
-        prediction = _lambert(radiance, weight, light)
-        shading = prediction.mean(axis=-1)
-        if step + 1 < _STEPS:
-            error = brightness - shading
-            size = np.sort(np.where(usable, np.abs(error), -np.inf), axis=1)[pixels, middle][:, None]
-            scale = np.clip(1.5 * size, 0.01 * typical + read_noise, 0.1 * typical + 2 * read_noise)
-            lit = usable & (shading > 0.05 * typical)
-            weight = np.where(lit, (1.0 + (error / (2 * scale)) ** 2) ** -2.0, 0.0)
+    for _ in range(_STEPS):
+        shading = _lambert(brightness[..., None], weight, light)[..., 0]
+        error = brightness - shading
+        size = np.sort(np.where(usable, np.abs(error), -np.inf), axis=1)[pixels, middle][:, None]
+        scale = np.clip(1.5 * size, 0.01 * typical + read_noise, 0.1 * typical + 2 * read_noise)
+        lit = usable & (shading > 0.05 * typical)
+        weight = np.where(lit, 1.0 / (1.0 + (error / (2 * scale)) ** 2) ** 2, 0.0)
+    prediction = _lambert(radiance, weight, light)
+    shading = prediction.mean(axis=-1)
     excess = radiance - prediction
     strength = excess.mean(axis=-1)
     bright = (

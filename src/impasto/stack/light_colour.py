@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +17,9 @@ from impasto.store import ASSUMED_WHITE, StackHeader
 # Pixels whose diffuse colours differ by less than this (natural logarithm) count as one paint.
 _PAINT_WIDTH = 0.15
 _PAINT_PIXELS = 8
+
+# Pixels whose highlights are separated at a time, on each processor.
+_BLOCK = 2048
 
 # How a paint's highlights may be off, in natural logarithms: any way, by this; towards the paint's own
 # colour, by this share of the way, because its diffuse reflection is not quite Lambert's; and by this where
@@ -128,8 +133,18 @@ def _highlights(samples: Samples, header: StackHeader) -> Highlights:
     clip_level = [math.inf if level is None else level for level in header.clip_level]
     usable = np.isfinite(radiance) & (radiance < clip_level)
     radiance /= np.broadcast_to(header.lights.intensity, radiance.shape[1:])
-    lights = _light_vectors(samples, header)
-    return separate(radiance, np.all(usable, axis=-1), lights, header.noise["read"])
+    lights = np.broadcast_to(_light_vectors(samples, header), (*radiance.shape[:2], 3))
+
+    def separated(part: slice) -> Highlights:
+        return separate(radiance[part], usable[part].all(axis=-1), lights[part], header.noise["read"])
+
+    parts = [slice(first, first + _BLOCK) for first in range(0, len(radiance), _BLOCK)]
+    with ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="highlights") as pool:
+        blocks = list(pool.map(separated, parts))
+    return Highlights(
+        excess=np.concatenate([block.excess for block in blocks]),
+        diffuse=np.concatenate([block.diffuse for block in blocks]),
+    )
 
 
 def _light_vectors(samples: Samples, header: StackHeader) -> Array:
