@@ -304,7 +304,7 @@ def test_a_stack_that_is_missing_or_unfinished_is_refused(small, tmp_path):
 def fit_in_a_process(path, models):
     """Start a fit in a process that has everything imported; return it."""
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["impasto.fit", "zarr", "zarrs"])
+    context.set_forkserver_preload(["impasto.fit"])
     process = context.Process(target=fit, args=(path,), kwargs={"models": models})
     process.start()
     return process

@@ -1,5 +1,6 @@
 """From photographs to a stack: values, what is counted, interruptions, and what is refused."""
 
+import hashlib
 import json
 import signal
 import subprocess
@@ -277,6 +278,22 @@ def test_fewer_photographs_are_decoded_at_a_time_where_memory_is_short(tmp_path,
     assert _decoders(large, linearise, 0.2e9) == 1
 
 
+def test_a_stack_of_an_earlier_version_is_known_by_its_digests(tmp_path):
+    folder = write_capture(tmp_path / "photos", noise_images(3, 30, 29))
+    stack(folder, tmp_path / "s.zarr")
+    document = tmp_path / "s.zarr" / "stack" / "zarr.json"
+    metadata = json.loads(document.read_text())
+    for entry in metadata["attributes"]["inputs"]:
+        del entry["blake3"]
+        entry["sha256"] = hashlib.sha256((folder / entry["file"]).read_bytes()).hexdigest()
+    document.write_text(json.dumps(metadata))
+    assert stack(folder, tmp_path / "s.zarr").already
+    assert len(stores.open_stack(tmp_path / "s.zarr").sha256) == 64
+    tifffile.imwrite(folder / "light01.tif", noise_images(1, 30, 29)[0][::-1], photometric="rgb")
+    with pytest.raises(StoreError, match="1 of its photographs have changed"):
+        stack(folder, tmp_path / "s.zarr")
+
+
 def test_an_unfinished_stack_of_another_layout_is_begun_anew(tmp_path):
     folder = write_capture(tmp_path / "photos", noise_images(3, 300, 290))
     stack(folder, tmp_path / "whole.zarr")
@@ -291,7 +308,7 @@ def test_an_unfinished_stack_of_another_layout_is_begun_anew(tmp_path):
 
 
 _CHILD = """
-import sys, zarr, zarrs, tifffile
+import sys, tifffile
 from impasto.stack import _decoders, stack
 print("ready", flush=True)
 stack(sys.argv[1], sys.argv[2])

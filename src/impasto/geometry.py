@@ -201,6 +201,12 @@ class Camera:
         )
 
 
+def rows_and_columns(rows: slice, columns: slice) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the row and the column of each pixel of a tile, rows first, as two arrays of shape (N,)."""
+    row, column = np.arange(rows.start, rows.stop), np.arange(columns.start, columns.stop)
+    return np.repeat(row, len(column)), np.tile(column, len(row))
+
+
 def pixel_position_mm(
     rows: slice, columns: slice, height: int, width: int, mm_per_px: float
 ) -> NDArray[np.float32]:
@@ -220,7 +226,7 @@ def pixel_position_mm(
     ndarray of shape (rows * columns, 2), float32
         X and Y in mm of each pixel's centre, rows first; row 0 is the top of the painting.
     """
-    row, column = np.mgrid[rows.start : rows.stop, columns.start : columns.stop].reshape(2, -1)
+    row, column = rows_and_columns(rows, columns)
     return position_mm(row, column, height, width, mm_per_px)
 
 

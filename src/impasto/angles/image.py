@@ -9,6 +9,7 @@ import numpy as np
 from impasto.angles.photographed import Photographed
 from impasto.angles.refit import Score
 from impasto.angles.study import STRATEGIES, Point, Study
+from impasto.geometry import rows_and_columns
 from impasto.progress import progress
 from impasto.store import STACK_CHUNK
 
@@ -49,7 +50,7 @@ def image_rms(
                 rows = slice(top, min(top + STACK_CHUNK, height))
                 columns = slice(left, min(left + STACK_CHUNK, width))
                 tile = stack.radiance(rows, columns)
-                row, column = np.mgrid[rows, columns].reshape(2, -1)
+                row, column = rows_and_columns(rows, columns)
                 pixels = Photographed(stack, camera, row, column, tile.reshape(len(tile), row.size, -1))
                 score = Score(pixels, scored)
                 samples, radiance = samples + score.samples, radiance + score.radiance

@@ -41,11 +41,7 @@ _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 
 def main() -> None:
     """Run the command line."""
-    _keep_freed_memory()
-    # Threads of OpenBLAS that have nothing to do would turn in circles for 20 ms each time before they sleep.
-    os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
-    # Loading makes many objects that stay, among which there is no rubbish to look for.
-    gc.set_threshold(100_000, 50, 50)
+    _spare_the_system()
     # All subcommands take a while to load; the one that is called is enough.
     called = next(iter(sys.argv[1:]), "")
     import_module(f"{__name__}.{called if called in COMMANDS else 'commands'}")
@@ -54,8 +50,15 @@ def main() -> None:
     app()
 
 
-def _keep_freed_memory() -> None:
-    """Let large buffers be used again instead of going back to the system, which clears each page anew."""
+def _spare_the_system() -> None:
+    """Choose how memory and threads are kept; together a tenth of what `stack` and `fit` take for 4 Mpx."""
+    # Loading makes many objects that stay, among which there is no rubbish to look for.
+    gc.set_threshold(100_000, 50, 50)
+    # Threads of OpenBLAS that have nothing to do would turn in circles for 20 ms each time before they sleep,
+    # and pages of 2 MB take longer to clear than they save.
+    os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
+    os.environ.setdefault("NUMPY_MADVISE_HUGEPAGE", "0")
+    # Large buffers are used again instead of going back to the system, which clears each page anew.
     with suppress(OSError, AttributeError):  # where the C library is not glibc
         library = ctypes.CDLL(None)
         for parameter in (_TRIM_THRESHOLD, _MMAP_THRESHOLD):

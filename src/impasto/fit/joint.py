@@ -24,7 +24,7 @@ from impasto.fit.sample import Sample, sample_pixels
 from impasto.fit.self_calibration import Calibration, self_calibrate
 from impasto.fit.strength import find_strength
 from impasto.fit.tile import fit_tile
-from impasto.geometry import Lights, position_mm
+from impasto.geometry import Lights, position_mm, rows_and_columns
 from impasto.models import ModelSpec
 from impasto.pixels import Pixels, pixels_of_maps, render_pixels
 
@@ -151,7 +151,7 @@ class Joint:
 
     def fit(self, radiance: NDArray[Any], rows: slice, columns: slice) -> stores.Maps:
         """Fit a tile; see `Procedure.fit`."""
-        row, column = np.mgrid[rows.start : rows.stop, columns.start : columns.stop].reshape(2, -1)
+        row, column = rows_and_columns(rows, columns)
         values = radiance.reshape(len(radiance), -1, radiance.shape[-1])
         maps = self.fit_pixels(values, row, column, self._selected)
         remainder = self._remainder

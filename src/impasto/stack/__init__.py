@@ -22,6 +22,7 @@ from impasto.errors import CaptureError, Problem, StoreError, raise_problems
 from impasto.progress import progress
 from impasto.stack.brackets import Exposure, check_times, merge, merged_noise, read_brackets, sample
 from impasto.stack.corrections import Corrections, read_corrections
+from impasto.stack.digests import ALGORITHM, photograph_digest
 from impasto.stack.light_colour import light_colour
 from impasto.stack.linearise import Linearisation, linearisations
 from impasto.stack.samples import Samples
@@ -294,9 +295,11 @@ class _Job:
         count = len(photographs)
         changed = set()
         with progress("Comparing photographs", count, show=self._show) as advance:
-            for light, future in self._in_parallel(self._sha256_of):
+            # Earlier versions noted SHA-256.
+            algorithm = ALGORITHM if ALGORITHM in found["inputs"][0] else "sha256"
+            for light, future in self._in_parallel(lambda light: self._digest_of(light, algorithm)):
                 advance(1)
-                if found["inputs"][light]["sha256"] not in (future.result(), None):
+                if found["inputs"][light][algorithm] not in (future.result(), None):
                     changed.add(photographs[light].name)
         some = ", ".join(sorted(changed)[:5])
         return f"{len(changed)} of its photographs have changed ({some})" if changed else ""
@@ -353,30 +356,9 @@ class _Job:
                 pool.shutdown(cancel_futures=True)
                 raise
 
-    def _sha256_of(self, light: int) -> str:
-        """Return the SHA-256 of a photograph, or of those of all its exposures."""
-        sums = [self._sha256(exposure.photograph.path) for exposure in self._exposures[light]]
-        return sums[0] if len(sums) == 1 else hashlib.sha256(" ".join(sums).encode()).hexdigest()
-
-    def _sha256(self, path: Path) -> str:
-        """Return the SHA-256 of a file in hexadecimal.
-
-        Raises
-        ------
-        CaptureError
-            If it cannot be read.
-        """
-        digest = hashlib.sha256()
-        block = memoryview(bytearray(1 << 18))  # which stays in the processor's cache
-        try:
-            with path.open("rb", buffering=0) as file:
-                while count := file.readinto(block):
-                    self._check_stop()
-                    digest.update(block[:count])
-        except OSError as error:
-            what = f"cannot be read: {error.strerror}"
-            raise CaptureError(Problem(path.name, what, "Copy it again, or leave it out by name")) from error
-        return digest.hexdigest()
+    def _digest_of(self, light: int, algorithm: str = ALGORITHM) -> str:
+        files = [exposure.photograph.path for exposure in self._exposures[light]]
+        return photograph_digest(files, algorithm, self._check_stop)
 
     def _check_stop(self) -> None:
         if self._stop.is_set():
@@ -385,8 +367,8 @@ class _Job:
     def _write_one(self, writer: stores.StackWriter, light: int, advance: Callable[[int], None]) -> bool:
         """Write one photograph; return whether it was there already."""
         photograph = self.capture.photographs[light]
-        sha256 = self._sha256_of(light)
-        if writer.sha256[light] == sha256:
+        digest = self._digest_of(light)
+        if writer.digests[light] == digest:
             advance(photograph.height)
             return True
         merged = len(self._exposures[light]) > 1
@@ -405,7 +387,7 @@ class _Job:
                 advance(len(band))
 
         writer.write_light(light, stored())
-        writer.finish_light(light, sha256, clipped)
+        writer.finish_light(light, digest, clipped)
         return False
 
     def _shift(self, shift_px: tuple[float, float]) -> Shift:

@@ -64,7 +64,8 @@ def separate(radiance: Array, usable: NDArray[np.bool_], light: Array, read_nois
     """
     usable = usable & (usable.sum(axis=1, keepdims=True) >= _LEAST_LIGHTS)
     radiance = np.where(usable[..., None], radiance, 0.0)
-    brightness = radiance.mean(axis=-1)
+    mean = np.full(radiance.shape[2], 1 / radiance.shape[2])
+    brightness = radiance @ mean
     count = np.maximum(usable.sum(axis=1), 1)
     # Samples that are left out sort first, so the middle of the others lies half their number from the end.
     middle = brightness.shape[1] - 1 - count // 2
@@ -72,6 +73,7 @@ def separate(radiance: Array, usable: NDArray[np.bool_], light: Array, read_nois
     typical = np.sort(np.where(usable, brightness, -np.inf), axis=1)[pixels, middle]
     typical = np.where(np.isfinite(typical), typical, 0.0)[:, None]
     weight = usable.astype(np.float64)
+    light = np.ascontiguousarray(light.swapaxes(1, 2))  # numpy is slow along short axes
     for _ in range(_STEPS):
         shading = _lambert(brightness[..., None], weight, light)[..., 0]
         error = brightness - shading
@@ -80,9 +82,9 @@ def separate(radiance: Array, usable: NDArray[np.bool_], light: Array, read_nois
         lit = usable & (shading > 0.05 * typical)
         weight = np.where(lit, 1.0 / (1.0 + (error / (2 * scale)) ** 2) ** 2, 0.0)
     prediction = _lambert(radiance, weight, light)
-    shading = prediction.mean(axis=-1)
+    shading = prediction @ mean
     excess = radiance - prediction
-    strength = excess.mean(axis=-1)
+    strength = excess @ mean
     bright = (
         usable
         & (strength > _STRONG * np.maximum(shading, 0.0))
@@ -97,11 +99,11 @@ def separate(radiance: Array, usable: NDArray[np.bool_], light: Array, read_nois
 
 
 def _lambert(radiance: Array, weight: Array, light: Array) -> Array:
-    """Return Lambert's law, fitted to each pixel with weights of shape (N, L), under each light."""
-    weighted = (light * weight[..., None]).swapaxes(1, 2)
-    normal_matrix = weighted @ light
+    """Return Lambert's law, fitted to pixels (N, L, C) with weights (N, L), under lights (N or 1, 3, L)."""
+    weighted = light * weight[:, None]
+    normal_matrix = weighted @ light.swapaxes(1, 2)
     # Lights in one plane leave a direction open, which their own predictions do not need.
     ridge = 1e-6 * np.trace(normal_matrix, axis1=1, axis2=2) + 1e-12
     normal_matrix += ridge[:, None, None] * np.eye(3)
-    prediction: Array = light @ np.linalg.solve(normal_matrix, weighted @ radiance)
+    prediction: Array = light.swapaxes(1, 2) @ np.linalg.solve(normal_matrix, weighted @ radiance)
     return prediction

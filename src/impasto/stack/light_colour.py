@@ -133,10 +133,11 @@ def _highlights(samples: Samples, header: StackHeader) -> Highlights:
     clip_level = [math.inf if level is None else level for level in header.clip_level]
     usable = np.isfinite(radiance) & (radiance < clip_level)
     radiance /= np.broadcast_to(header.lights.intensity, radiance.shape[1:])
-    lights = np.broadcast_to(_light_vectors(samples, header), (*radiance.shape[:2], 3))
+    lights = _light_vectors(samples, header)
 
     def separated(part: slice) -> Highlights:
-        return separate(radiance[part], usable[part].all(axis=-1), lights[part], header.noise["read"])
+        here = lights if len(lights) == 1 else lights[part]
+        return separate(radiance[part], np.all(usable[part], axis=-1), here, header.noise["read"])
 
     parts = [slice(first, first + _BLOCK) for first in range(0, len(radiance), _BLOCK)]
     with ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="highlights") as pool:

@@ -43,7 +43,7 @@ from impasto.store.layout import (
     units,
 )
 from impasto.store.published import PublishedStack, is_published, open_published
-from impasto.store.stack_writer import StackHeader, StackWriter
+from impasto.store.stack_writer import StackHeader, StackWriter, noted_digest
 from impasto.store.stacks import Stack, open_stack
 
 if TYPE_CHECKING:
@@ -82,6 +82,7 @@ __all__ = [
     "lights",
     "log_path",
     "no_room",
+    "noted_digest",
     "open",
     "open_fit",
     "open_published",

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from impasto.store.files import reading
 from impasto.store.hierarchy import (
     Attributes,
-    lost_pieces,
     open_array,
     provenance,
     read_group,
@@ -52,9 +51,9 @@ class Evaluation:
         path = f"{EVALUATIONS}/{self.attributes['model']}/{_ARRAY}"
         array = open_array(self.store, path)
         with reading(self.store, path, "Run impasto evaluate again"):
-            if lost_pieces(self.store, path, array):
+            if array.lost():
                 raise ValueError("a part of the renderings is lost")
-            return np.asarray(array[...])
+            return array.read()
 
 
 def write_evaluation(

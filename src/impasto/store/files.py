@@ -25,9 +25,6 @@ _PARTIAL = re.compile(r".+\.(\d+|[0-9a-f]{32})\.partial")
 # What decoders raise on a chunk with a wrong checksum, cut off, or empty.
 DAMAGE = (OSError, RuntimeError, ValueError, IndexError)
 
-# zarrs reports faults of the disk as text only.
-_OS_ERROR = re.compile(r"\(os error (\d+)\)")
-
 
 def write_json(path: Path, value: Mapping[str, Any]) -> None:
     """Write `value` to `path`, whole or not at all.
@@ -116,11 +113,8 @@ def writing(store: Path, what: str) -> Iterator[None]:
     """
     try:
         yield
-    except (OSError, RuntimeError) as error:
-        number = _os_error(error)
-        if number is None and not isinstance(error, OSError):
-            raise
-        if number in _NO_ROOM:
+    except OSError as error:
+        if error.errno in _NO_ROOM:
             cause = "there is no room left on the disk, or a quota is used up"
             do = "Make room and run the same command again: what was finished is kept"
         else:
@@ -143,13 +137,6 @@ def reading(store: Path, what: str, do: str) -> Iterator[None]:
         else:
             cause = f"is damaged: {error}".rstrip(".")
         raise StoreError(Problem(where=f"{store}: {what}", what=cause, do=do)) from error
-
-
-def _os_error(error: Exception) -> int | None:
-    if isinstance(error, OSError):
-        return error.errno
-    found = _OS_ERROR.search(str(error))
-    return int(found.group(1)) if found else None
 
 
 class RunLog:

@@ -7,12 +7,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from impasto.errors import Problem, StoreError
+from impasto.store.array_reader import ArrayReader
 from impasto.store.arrays import array_document
 from impasto.store.chunks import encode_chunks
 from impasto.store.files import DAMAGE, reading, writing
@@ -21,7 +22,6 @@ from impasto.store.hierarchy import (
     coarser_group,
     fit_group,
     has_array,
-    lost_pieces,
     open_array,
     read_group,
     remove,
@@ -41,9 +41,6 @@ from impasto.store.layout import (
     units,
 )
 from impasto.store.shards import write_shard
-
-if TYPE_CHECKING:
-    import zarr
 
 Maps = dict[str, NDArray[Any]]
 
@@ -94,7 +91,7 @@ class MapsWriter:
                 write_array_metadata(store, f"{group}/{map.name}", _document(map, height, width))
 
     @cached_property
-    def _status(self) -> zarr.Array[Any]:
+    def _status(self) -> ArrayReader:
         return open_array(self.store, f"{self.group}/status")
 
     def _shard(self, map: Map, unit: Unit) -> Path:
@@ -107,7 +104,7 @@ class MapsWriter:
         if not self._shard(status, unit).is_file():
             return False
         try:
-            self._status[unit.rows, unit.columns]
+            self._status.read(unit.rows, unit.columns)
         except DAMAGE:  # as good as not there
             return False
         return True
@@ -152,7 +149,7 @@ class MapsWriter:
         """Return how many pixels have each status, as an ndarray of shape (256,), int64."""
         counts = np.zeros(256, np.int64)
         for unit in units(self.height, self.width):
-            counts += status_counts(np.asarray(self._status[unit.rows, unit.columns]))
+            counts += status_counts(self._status.read(unit.rows, unit.columns))
         return counts
 
     def finish(self, more: Mapping[str, Any]) -> None:
@@ -209,7 +206,7 @@ class Fit:
         return tuple(sorted(path.name for path in (self.store / self.group).iterdir() if path.is_dir()))
 
     @cached_property
-    def _arrays(self) -> dict[str, zarr.Array[Any]]:
+    def _arrays(self) -> dict[str, ArrayReader]:
         return {name: open_array(self.store, f"{self.group}/{name}") for name in self.names}
 
     @property
@@ -221,7 +218,7 @@ class Fit:
     def map_attributes(self, name: str) -> tuple[Attributes, int]:
         """Return the attributes of a map, and how many values it has per pixel."""
         array = self._arrays[name]
-        return dict(array.attrs), array.shape[2] if len(array.shape) > 2 else 1
+        return array.attributes, array.shape[2] if len(array.shape) > 2 else 1
 
     def read(self, rows: slice, columns: slice, names: Iterable[str] | None = None) -> Maps:
         """Return maps of a tile.
@@ -247,10 +244,10 @@ class Fit:
         for name in self.names if names is None else names:
             do = "Run impasto fit with --overwrite to compute it anew"
             path = f"{self.group}/{name}"
-            if lost_pieces(self.store, path, self._arrays[name], rows, columns):
+            if self._arrays[name].lost(rows, columns):
                 raise StoreError(Problem(f"{self.store}: {path}", "has lost a part of its pixels", do))
             with reading(self.store, path, do):
-                tile[name] = np.asarray(self._arrays[name][rows, columns])
+                tile[name] = self._arrays[name].read(rows, columns)
         return tile
 
 

@@ -1,49 +1,28 @@
 """Groups and arrays of a store's Zarr v3 hierarchy.
 
 Metadata are small JSON documents, written here directly and atomically, and so are small arrays; large ones
-are written by `chunks` and `shards`. Arrays are read through zarr-python with the `zarrs` codec pipeline.
-zarr takes a sixth of a second to import, so that happens where an array is read.
+are written by `chunks` and `shards`. Arrays are read by `array_reader`.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import shutil
-import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
-from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from impasto.errors import Problem, StoreError
+from impasto.store.array_reader import ArrayReader
 from impasto.store.arrays import array_document
 from impasto.store.files import is_partial, write_json, write_whole, writing
 from impasto.store.layout import FITS, PYRAMIDS, SCHEMA, ZSTD
 
-if TYPE_CHECKING:
-    import zarr
-
 Attributes = dict[str, Any]
-
-_PIPELINE = "zarrs.ZarrsCodecPipeline"
-
-# zarr's configuration is global to the process, and so is this lock.
-_configuring = threading.Lock()
-
-
-@contextmanager
-def _pipeline() -> Iterator[None]:
-    """Have arrays opened inside use the Rust codecs, without changing zarr for the rest of the program."""
-    import zarr
-
-    with _configuring, zarr.config.set({"codec_pipeline.path": _PIPELINE}):
-        yield
 
 
 def provenance() -> Attributes:
@@ -204,7 +183,7 @@ def write_table(
             write_whole(store / path / f"c/{number // rows}{ending}", compressor.encode(chunk))
 
 
-def open_array(store: Path, path: str) -> zarr.Array[Any]:
+def open_array(store: Path, path: str) -> ArrayReader:
     """Open an array of a store to read it.
 
     Raises
@@ -212,11 +191,9 @@ def open_array(store: Path, path: str) -> zarr.Array[Any]:
     StoreError
         If it is not there or its metadata cannot be read.
     """
-    import zarr
-
     try:
-        with _pipeline():
-            return zarr.open_array(store, path=path, mode="r", zarr_format=3)
+        document = json.loads((store / path / "zarr.json").read_text(encoding="utf-8"))
+        return ArrayReader(store / path, document)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise StoreError(
             Problem(
@@ -225,28 +202,6 @@ def open_array(store: Path, path: str) -> zarr.Array[Any]:
                 do="Restore it from a copy, or run the command that made it again with --overwrite",
             )
         ) from error
-
-
-def lost_pieces(store: Path, path: str, array: zarr.Array[Any], *slices: slice) -> list[tuple[int, ...]]:
-    """Return the files of an array, by their chunk's or shard's number, that a selection needs and lacks.
-
-    Zarr reads what is not there as the fill value; but impasto writes every chunk, so such a file was lost.
-
-    Parameters
-    ----------
-    store : Path
-    path : str
-        Path of the array.
-    array : zarr.Array
-    *slices : slice
-        The selection along the first axes; the others are taken whole.
-    """
-    taken = [*slices, *(slice(None) for _ in array.shape[len(slices) :])]
-    axes = zip(taken, array.shape, array.shards or array.chunks, strict=True)
-    bounds = ((*part.indices(length)[:2], size) for part, length, size in axes)
-    numbers = (range(start // size, -(-stop // size)) for start, stop, size in bounds)
-    folder = f"{store}/{path}/c/"
-    return [piece for piece in product(*numbers) if not os.path.exists(folder + "/".join(map(str, piece)))]
 
 
 def has_array(store: Path, path: str) -> bool:

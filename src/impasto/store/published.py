@@ -10,22 +10,20 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from impasto.errors import Problem, StoreError
 from impasto.geometry import Camera
+from impasto.store.array_reader import ArrayReader
 from impasto.store.arrays import array_document
 from impasto.store.files import reading
 from impasto.store.fits import Fit, Maps
-from impasto.store.hierarchy import Attributes, lost_pieces, open_array, read_group
+from impasto.store.hierarchy import Attributes, open_array, read_group
 from impasto.store.layout import RESIDUAL
 from impasto.store.packing import Parameter, unpack
-
-if TYPE_CHECKING:
-    import zarr
 
 PUBLISHED_SCHEMA = 1
 PUBLISHED_CHUNK = 512
@@ -67,11 +65,11 @@ class PublishedFit(Fit):
         return [Parameter(**column) for column in self.attributes["parameters"]]
 
     @cached_property
-    def _packed(self) -> zarr.Array[Any]:
+    def _packed(self) -> ArrayReader:
         return open_array(self.store, self.group)
 
     @cached_property
-    def _residual(self) -> zarr.Array[Any]:
+    def _residual(self) -> ArrayReader:
         return open_array(self.store, self._residual_path)
 
     @property
@@ -98,11 +96,11 @@ class PublishedFit(Fit):
             maps[RESIDUAL] = self._codes(self._residual_path, self._residual, rows, columns)
         return {name: maps[name] for name in wanted}
 
-    def _codes(self, path: str, array: zarr.Array[Any], rows: slice, columns: slice) -> NDArray[Any]:
-        if lost_pieces(self.store, path, array, rows, columns):
+    def _codes(self, path: str, array: ArrayReader, rows: slice, columns: slice) -> NDArray[Any]:
+        if array.lost(rows, columns):
             raise StoreError(Problem(f"{self.store}: {path}", "has lost a part of its pixels", _AGAIN))
         with reading(self.store, path, _AGAIN):
-            return np.asarray(array[rows, columns])
+            return array.read(rows, columns)
 
 
 @dataclass(frozen=True)

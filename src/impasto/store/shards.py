@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from impasto.store.files import whole_file
 
 # What the index says, as offset and as size, about a chunk that is not there.
 _NONE = 2**64 - 1
 
-Chunks = Iterable[tuple[tuple[int, ...], bytes]]
+Place = tuple[int, ...]
+Chunks = Iterable[tuple[Place, bytes]]
 
 
 def write_shard(path: Path, grid: Sequence[int], chunks: Chunks) -> None:
@@ -39,13 +43,37 @@ def write_shard(path: Path, grid: Sequence[int], chunks: Chunks) -> None:
 
 def put_shard(file: BinaryIO, grid: Sequence[int], chunks: Chunks) -> None:
     """Put a shard into an open file; see `write_shard`."""
-    import google_crc32c
-
     index = np.full((*grid, 2), _NONE, "<u8")
     end = 0
     for place, chunk in chunks:
         index[place] = end, len(chunk)
         end += file.write(chunk)
     file.write(index.tobytes())
-    checksum: int = google_crc32c.value(index.tobytes())
-    file.write(checksum.to_bytes(4, "little"))
+    file.write(_checksum(index.tobytes()))
+
+
+def read_index(file: int, grid: Sequence[int]) -> NDArray[np.uint64]:
+    """Return the index of a shard, open by its descriptor, as offset and size of each chunk, (*grid, 2).
+
+    Raises
+    ------
+    ValueError
+        If it is damaged or cut off.
+    """
+    size = 16 * math.prod(grid)
+    data = os.pread(file, size + 4, max(0, os.fstat(file).st_size - size - 4))
+    if len(data) < size + 4 or _checksum(data[:size]) != data[size:]:
+        raise ValueError("the index of its chunks does not match its checksum")
+    return np.frombuffer(data, "<u8", 2 * math.prod(grid)).reshape(*grid, 2)
+
+
+def chunk_in(file: int, index: NDArray[np.uint64], place: Place) -> bytes | None:
+    """Return the bytes of a chunk of an open shard, None where it has none."""
+    offset, size = index[place].tolist()
+    return None if offset == _NONE else os.pread(file, size, offset)
+
+
+def _checksum(data: bytes) -> bytes:
+    import google_crc32c
+
+    return int(google_crc32c.value(data)).to_bytes(4, "little")

@@ -142,7 +142,7 @@ def _as_json(values: NDArray[np.float64] | tuple[str, ...]) -> Any:
 class StackWriter:
     """Writes a stack photograph by photograph, and remembers which are whole.
 
-    A photograph is one shard, there as a whole or not at all; it counts when its SHA-256 stands in the
+    A photograph is one shard, there as a whole or not at all; it counts when its digest stands in the
     metadata. Methods may be called from several threads, each with its own photograph.
 
     Parameters
@@ -194,7 +194,7 @@ class StackWriter:
         begun = {
             "coordinates": " ".join(_TABLES),
             **settings,
-            "inputs": [{**entry, "sha256": None, "clipped_samples": None} for entry in self._header.inputs],
+            "inputs": [{**entry, "blake3": None, "clipped_samples": None} for entry in self._header.inputs],
             "complete": False,
         }
         write_group(store, STACK, begun)
@@ -206,9 +206,9 @@ class StackWriter:
         return self._attributes
 
     @property
-    def sha256(self) -> list[str | None]:
-        """SHA-256 per photograph, None for those that are not written whole."""
-        return [entry["sha256"] for entry in self._attributes["inputs"]]
+    def digests(self) -> list[str | None]:
+        """Digest per photograph, None for those that are not written whole."""
+        return [entry["blake3"] for entry in self._attributes["inputs"]]
 
     def write_light(self, light: int, bands: Iterable[tuple[int, NDArray[Any]]]) -> None:
         """Write a photograph, in place of what there is of it.
@@ -237,15 +237,15 @@ class StackWriter:
         with writing(self.store, _RADIANCE):
             write_shard(self.store / _RADIANCE / f"c/{light}/0/0/0", self._grid, chunks())
 
-    def finish_light(self, light: int, sha256: str, clipped_samples: int) -> None:
+    def finish_light(self, light: int, blake3: str, clipped_samples: int) -> None:
         """Record that a photograph is written whole."""
-        self._record(light, sha256, clipped_samples)
+        self._record(light, blake3, clipped_samples)
 
-    def _record(self, light: int, sha256: str | None, clipped_samples: int | None) -> None:
+    def _record(self, light: int, blake3: str | None, clipped_samples: int | None) -> None:
         with self._writing:
             entry = self._attributes["inputs"][light]
-            if (entry["sha256"], entry["clipped_samples"]) != (sha256, clipped_samples):
-                entry.update(sha256=sha256, clipped_samples=clipped_samples)
+            if (entry["blake3"], entry["clipped_samples"]) != (blake3, clipped_samples):
+                entry.update(blake3=blake3, clipped_samples=clipped_samples)
                 write_group(self.store, STACK, self._attributes)
 
     def finish(self, more: Mapping[str, Any]) -> None:
@@ -256,7 +256,7 @@ class StackWriter:
         StoreError
             If a photograph is missing.
         """
-        missing = [entry["name"] for entry in self._attributes["inputs"] if entry["sha256"] is None]
+        missing = [entry["name"] for entry in self._attributes["inputs"] if entry["blake3"] is None]
         if missing:
             raise StoreError(unfinished_stack(self.store, self._attributes))
         self._attributes.update(more)
@@ -264,10 +264,16 @@ class StackWriter:
         write_group(self.store, STACK, self._attributes)
 
 
+def noted_digest(entry: Mapping[str, Any]) -> str | None:
+    """Return the digest of a photograph by its entry in a stack, None where it is not written whole."""
+    digest: str | None = entry.get("blake3", entry.get("sha256"))
+    return digest
+
+
 def unfinished_stack(store: Path, attributes: Attributes) -> Problem:
     """Return the problem that a stack is not finished, with how far it is."""
     inputs = attributes.get("inputs", [])
-    done = sum(entry["sha256"] is not None for entry in inputs)
+    done = sum(noted_digest(entry) is not None for entry in inputs)
     return Problem(
         where=f"{store}: {STACK}",
         what=f"is not finished: {done} of {len(inputs)} photographs are in it",

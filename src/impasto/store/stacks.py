@@ -6,27 +6,24 @@ import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from impasto.errors import Problem, StoreError, raise_problems
 from impasto.geometry import Camera, Lights
+from impasto.store.array_reader import ArrayReader
 from impasto.store.files import DAMAGE, digest, reading
 from impasto.store.hierarchy import (
     Attributes,
     has_array,
-    lost_pieces,
     open_array,
     read_group,
     source_problems,
 )
 from impasto.store.layout import ASSUMED_WHITE, STACK
-from impasto.store.stack_writer import unfinished_stack
-
-if TYPE_CHECKING:
-    import zarr
+from impasto.store.stack_writer import noted_digest, unfinished_stack
 
 _REQUIRED = ("scale", "offset", "clip_level", "noise", "camera", "inputs", "settings_sha256")
 
@@ -48,17 +45,17 @@ class Stack:
     attributes: Attributes = field(repr=False)
 
     @cached_property
-    def _radiance(self) -> zarr.Array[Any]:
+    def _radiance(self) -> ArrayReader:
         return open_array(self.store, f"{STACK}/radiance")
 
     def _table(self, name: str, *, known: bool = True) -> NDArray[Any]:
         # What is not known is NaN for every light, and Zarr need not write that.
         path = f"{STACK}/{name}"
         array = open_array(self.store, path)
-        if known and lost_pieces(self.store, path, array):
+        if known and array.lost():
             raise StoreError(Problem(f"{self.store}: {path}", "has lost its values", _AGAIN))
         with reading(self.store, path, _AGAIN):
-            return np.asarray(array[...])
+            return array.read()
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
@@ -69,7 +66,7 @@ class Stack:
     @property
     def dtype(self) -> np.dtype:
         """Type of the stored values: uint16 or float32."""
-        return np.dtype(self._radiance.dtype)
+        return self._radiance.dtype
 
     @cached_property
     def lights(self) -> Lights:
@@ -132,7 +129,7 @@ class Stack:
     @property
     def sha256(self) -> str:
         """A digest of the stack's settings and of the contents of every photograph."""
-        photographs = [entry["sha256"] for entry in self.attributes["inputs"]]
+        photographs = [noted_digest(entry) for entry in self.attributes["inputs"]]
         return digest([self.attributes["settings_sha256"], photographs])
 
     @property
@@ -175,27 +172,18 @@ class Stack:
         raise_problems(StoreError, self._lost(rows, columns, index))
         tile = np.empty(shape, self.dtype) if buffer is None else buffer[: math.prod(shape)].reshape(shape)
         try:
-            self._read_into(tile, index, rows, columns)
+            for values, light in zip(tile, index, strict=True):
+                self._radiance.read(slice(light, light + 1), rows, columns, out=values[np.newaxis])
         except DAMAGE as error:
             raise StoreError(self._damage(rows, columns, error)) from error
         return tile
 
-    def _read_into(self, tile: NDArray[Any], index: NDArray[np.intp], rows: slice, columns: slice) -> None:
-        from zarr.buffer.cpu import NDBuffer
-
-        # Runs of neighbouring lights keep to slices, the only selection that the Rust codecs take.
-        for run in np.split(np.arange(len(index)), np.flatnonzero(np.diff(index) != 1) + 1):
-            if len(run):
-                part = tile[run[0] : run[-1] + 1]
-                selection = (slice(int(index[run[0]]), int(index[run[-1]]) + 1), rows, columns, slice(None))
-                self._radiance.get_basic_selection(selection, out=NDBuffer.from_numpy_array(part))
-
     def _lost(self, rows: slice, columns: slice, index: NDArray[np.intp]) -> list[Problem]:
-        path, count = f"{STACK}/radiance", self.shape[0]
-        pieces = lost_pieces(self.store, path, self._radiance, slice(0, count), rows, columns)
-        lost = {piece[0] for piece in pieces} & set(index.tolist())
+        lost = {number[0] for number in self._radiance.lost(slice(None), rows, columns)} & set(index.tolist())
         names = [self.attributes["inputs"][light]["name"] for light in sorted(lost)]
-        return [Problem(f"{self.store}: {path}", f"{name} has lost pixels", _AGAIN) for name in names]
+        return [
+            Problem(f"{self.store}: {STACK}/radiance", f"{name} has lost pixels", _AGAIN) for name in names
+        ]
 
     def _damage(self, rows: slice, columns: slice, error: Exception) -> list[Problem]:
         problems = []
@@ -203,7 +191,7 @@ class Stack:
         where = f"rows {rows.start} to {rows.stop - 1}, columns {columns.start} to {columns.stop - 1}"
         for light, entry in enumerate(self.attributes["inputs"]):
             try:
-                self._radiance[light : light + 1, rows, columns]
+                self._radiance.read(slice(light, light + 1), rows, columns)
             except DAMAGE as cause:
                 problems.append(Problem(place, f"{entry['name']} is damaged at {where}: {cause}", _AGAIN))
         return problems or [Problem(place, f"cannot be read at {where}: {error}", _AGAIN)]

@@ -7,6 +7,7 @@ import json
 from impasto.console import versions
 from impasto.page import Section
 from impasto.report.subject import Subject
+from impasto.store import noted_digest
 
 
 def section(subject: Subject) -> Section:
@@ -39,8 +40,8 @@ def section(subject: Subject) -> Section:
     page.table(("fit", "option", "value"), rows, caption="Options of the fits", words=True)
     page.text(f"Digest of the stack, its settings and all photographs: {subject.stack.sha256}")
     page.table(
-        ("photograph", "SHA-256"),
-        [(entry["file"], str(entry["sha256"])) for entry in stack["inputs"]],
+        ("photograph", "BLAKE3" if "blake3" in stack["inputs"][0] else "SHA-256"),
+        [(entry["file"], str(noted_digest(entry))) for entry in stack["inputs"]],
         caption="The photographs",
         words=True,
     )
