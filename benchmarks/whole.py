@@ -64,14 +64,11 @@ def impasto(*arguments: str) -> dict[str, float]:
 
 def measure(capture: Capture, store: Path) -> dict[str, Any]:
     """Time the way from a capture to maps, without and with a residual, a rendering, and the two floors."""
-    shutil.rmtree(store, ignore_errors=True)
     # As it lies after a first use, or in an installed package.
     compileall.compile_dir(Path(find_spec("impasto").origin).parent, quiet=1)
     floors = {what: _alone(what, capture.folder) for what in ("decode", "memory")}
     fit_alone = floors["memory"]["seconds"] * capture.pixels / floors["memory"]["pixels"]
-    os.sync()  # writing the photographs is not part of the way
-    stack = impasto("stack", str(capture.folder), str(store))
-    fit = impasto("fit", str(store), "--model", MODEL)
+    stack, fit = min((_way(capture.folder, store) for _ in range(2)), key=_wall)
     report = impasto("report", str(store), str(store.with_suffix(".html")))
     residual = impasto("fit", str(store), "--model", MODEL, "--residual", "--overwrite")
     frame = _alone("frame", store)
@@ -87,9 +84,20 @@ def measure(capture: Capture, store: Path) -> dict[str, Any]:
         "report": report,
         "decode_alone_s": floors["decode"]["seconds"],
         "fit_alone_s": fit_alone,
-        "ratio": (stack["wall_s"] + fit["wall_s"]) / alone,
+        "ratio": _wall((stack, fit)) / alone,
         "peak_gb": max(run["peak_gb"] for run in (stack, fit, residual)),
     }
+
+
+def _way(photos: Path, store: Path) -> tuple[dict[str, float], dict[str, float]]:
+    """Stack and fit; the faster of two runs counts, as for the floors."""
+    shutil.rmtree(store, ignore_errors=True)
+    os.sync()  # what was written before is not part of the way
+    return impasto("stack", str(photos), str(store)), impasto("fit", str(store), "--model", MODEL)
+
+
+def _wall(steps: tuple[dict[str, float], ...]) -> float:
+    return sum(step["wall_s"] for step in steps)
 
 
 def _alone(what: str, path: Path) -> dict[str, float]:
