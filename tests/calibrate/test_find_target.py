@@ -12,15 +12,18 @@ from typer.testing import CliRunner
 
 import impasto
 from impasto.calibrate.find_target import find_target
+from impasto.calibrate.known_targets import KNOWN_TARGETS
 from impasto.calibrate.patches import read_patches
 from impasto.capture.simulate.charts import colour_chart
 from impasto.cli.commands import app
 from impasto.errors import CaptureError, OptionError
 
+CLASSIC = KNOWN_TARGETS["classic"]
+
 
 def assert_found(radiance, middles):
     """Each box lies about its own patch's middle, which no other patch's is near."""
-    found = find_target(radiance, "chart")
+    found = find_target(radiance, "chart", CLASSIC)
     assert found.names == colour_chart().names
     boxes = np.array(found.boxes, float)
     centres = (boxes[:, :2] + boxes[:, 2:] - 1) / 2
@@ -51,7 +54,7 @@ def test_it_is_found_in_noise_in_the_dark_on_a_black_ground_and_in_haze(spoilt):
 def test_the_boxes_hold_one_patch_only():
     """What is read in each is the patch's own reflectance, under even light, of a camera without noise."""
     radiance, _ = photograph(turns=1, angle_deg=8, perspective=0.2, gain=(1, 1, 1), noise=0)
-    found = find_target(radiance, "chart")
+    found = find_target(radiance, "chart", CLASSIC)
     light = 1 + 0.2 * np.arange(radiance.shape[1]) / radiance.shape[1]
     even = radiance / light[None, :, None]
     for (left, top, right, bottom), known in zip(found.boxes, colour_chart().reflectance, strict=True):
@@ -61,28 +64,34 @@ def test_the_boxes_hold_one_patch_only():
 @pytest.mark.parametrize("turns", range(4))
 def test_a_mirrored_one_is_refused(turns):
     with pytest.raises(CaptureError, match=r"chart: shows the target mirrored\. Do not mirror"):
-        find_target(photograph(turns=turns, mirrored=True)[0], "chart")
+        find_target(photograph(turns=turns, mirrored=True)[0], "chart", CLASSIC)
 
 
 def test_a_covered_patch_is_named():
     with pytest.raises(
         CaptureError, match=r"patch dark skin: is off the target's data by \d+ CIELAB"
     ) as error:
-        find_target(photograph(covered=np.s_[:100, :200])[0], "chart")
+        find_target(photograph(covered=np.s_[:100, :200])[0], "chart", CLASSIC)
     assert {problem.where for problem in error.value.problems} == {"patch dark skin", "patch light skin"}
     assert "by hand" in error.value.problems[0].do
+
+
+def test_something_light_on_the_black_patch_is_not_laid_to_the_others():
+    with pytest.raises(CaptureError) as error:
+        find_target(photograph(covered=np.s_[300:, 500:])[0], "chart", CLASSIC)
+    assert [problem.where for problem in error.value.problems] == ["patch black 2 (1.5 D)"]
 
 
 @pytest.mark.parametrize("covered", [np.s_[:, 300:], np.s_[100:, :]])
 def test_one_that_is_mostly_covered_is_refused(covered):
     with pytest.raises(CaptureError, match="by hand"):
-        find_target(photograph(covered=covered)[0], "chart")
+        find_target(photograph(covered=covered)[0], "chart", CLASSIC)
 
 
 def test_low_contrast_is_refused():
     """Where half of all light is glare, its colours are no measure of the camera's."""
     with pytest.raises(CaptureError, match="by hand"):
-        find_target(photograph(haze=0.6)[0], "chart")
+        find_target(photograph(haze=0.6)[0], "chart", CLASSIC)
 
 
 @pytest.mark.parametrize(
@@ -92,12 +101,12 @@ def test_low_contrast_is_refused():
 )  # fmt: skip
 def test_nothing_is_found_where_there_is_none(radiance):
     with pytest.raises(CaptureError, match=r"painting: shows .*by hand"):
-        find_target(radiance, "painting")
+        find_target(radiance, "painting", CLASSIC)
 
 
 def test_a_photograph_without_colour_is_refused():
     with pytest.raises(CaptureError, match="is grey, expected three channels"):
-        find_target(np.ones((300, 400, 1)), "chart")
+        find_target(np.ones((300, 400, 1)), "chart", CLASSIC)
 
 
 @pytest.fixture

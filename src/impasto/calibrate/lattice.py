@@ -19,7 +19,6 @@ _LEAST_PX = 36
 _NEIGHBOURS = 6
 # A patch belongs to a lattice that passes its centre within this share of a step.
 _OFF = 0.2
-_ROUNDS = 6
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ class Lattice:
         return project(self.homography, steps)
 
 
-def lattices(image: Array, least: int) -> Iterator[Lattice]:
+def lattices(image: Array, least: int, longest: int) -> Iterator[Lattice]:
     """Find lattices in an image, each of at least so many patches; not turned over.
 
     Parameters
@@ -50,14 +49,20 @@ def lattices(image: Array, least: int) -> Iterator[Lattice]:
     image : ndarray of shape (H, W, C)
         About evenly spaced for the eye, such as cube roots of radiance, largest 1.
     least : int
+    longest : int
+        Patches in the longest row of what is looked for.
     """
-    steep = np.max(
-        [ndimage.gaussian_gradient_magnitude(image[..., c], 1.0) for c in range(image.shape[2])], axis=0
-    )
+    steepness = steep(image)
     for even in _EVEN:
-        centres, areas = _patches(steep < even)
-        if len(centres) >= least:
-            yield from _lattices_of(centres, areas, least)
+        patches = even_patches(steepness < even)
+        if len(patches.centre) >= least:
+            yield from _lattices_of(patches.centre, patches.area, least, longest)
+
+
+def steep(image: Array) -> Array:
+    """Return the steepness of an image (H, W, C) per pixel, of its steepest channel."""
+    channels = [ndimage.gaussian_gradient_magnitude(image[..., c], 1.0) for c in range(image.shape[2])]
+    return np.asarray(np.max(channels, axis=0))
 
 
 def project(homography: Array, points: Array) -> Array:
@@ -86,8 +91,26 @@ def _normalising(points: Array) -> Array:
     return np.array([[scale, 0, -scale * centre[0]], [0, scale, -scale * centre[1]], [0, 0, 1]])
 
 
-def _patches(even: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return centres (N, 2), column first, and areas of the regions that are filled parallelograms."""
+@dataclass(frozen=True)
+class EvenPatches:
+    """Regions that are filled parallelograms.
+
+    Parameters
+    ----------
+    centre : ndarray of shape (N, 2)
+        Column and row.
+    area : ndarray of shape (N,)
+    covariance : ndarray of shape (N, 2, 2)
+        Of their pixels' columns and rows.
+    """
+
+    centre: Array
+    area: Array
+    covariance: Array
+
+
+def even_patches(even: NDArray[np.bool_], slim: float = 2.4) -> EvenPatches:
+    """Find filled parallelograms among the even pixels, up to `slim` times as long as wide."""
     labels, count = ndimage.label(even)
     label = labels.ravel()
     row, column = (axis.ravel().astype(np.float64) for axis in np.indices(labels.shape))
@@ -103,11 +126,14 @@ def _patches(even: NDArray[np.bool_]) -> tuple[Array, Array]:
         filled = area / (12 * np.sqrt(np.maximum(xx * yy - xy * xy, 0)))
         root = np.hypot(xx - yy, 2 * xy)
         longer = (xx + yy + root) / (xx + yy - root)
-        good = (area >= _LEAST_PX) & (np.abs(filled - 1) < 0.12) & (longer < 6) & (area < labels.size / 12)
-    return np.column_stack([x, y])[good], area[good]
+        good = (
+            (area >= _LEAST_PX) & (np.abs(filled - 1) < 0.12) & (longer < slim**2) & (area < labels.size / 12)
+        )
+    covariance = np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=-1)
+    return EvenPatches(np.column_stack([x, y])[good], area[good], covariance[good])
 
 
-def _lattices_of(centres: Array, areas: Array, least: int) -> Iterator[Lattice]:
+def _lattices_of(centres: Array, areas: Array, least: int, longest: int) -> Iterator[Lattice]:
     tree = cKDTree(centres)
     _, near = tree.query(centres, min(_NEIGHBOURS + 1, len(centres)))
     seen: set[frozenset[int]] = set()
@@ -124,7 +150,7 @@ def _lattices_of(centres: Array, areas: Array, least: int) -> Iterator[Lattice]:
             lengths = np.hypot(*across), np.hypot(*down)
             if cross < 0.7 * lengths[0] * lengths[1] or max(lengths) > 1.8 * min(lengths):
                 continue
-            found = _grow(centres, seed, across, down, least)
+            found = _grow(centres, seed, across, down, least, longest)
             if found is None:
                 continue
             lattice, members = found
@@ -136,13 +162,13 @@ def _lattices_of(centres: Array, areas: Array, least: int) -> Iterator[Lattice]:
 
 
 def _grow(
-    centres: Array, seed: int, across: Array, down: Array, least: int
+    centres: Array, seed: int, across: Array, down: Array, least: int, longest: int
 ) -> tuple[Lattice, frozenset[int]] | None:
     homography = np.column_stack([[*across, 0], [*down, 0], [*centres[seed], 1]])
     reach = 1.5
     members = np.zeros(0, np.intp)
     steps = np.zeros((0, 2))
-    for _ in range(_ROUNDS):
+    for _ in range(longest):
         place = project(np.linalg.inv(homography), centres)
         step = np.rint(place)
         near = (np.abs(place - step).max(axis=1) < _OFF) & (np.abs(step).max(axis=1) <= reach)

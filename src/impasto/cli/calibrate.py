@@ -224,16 +224,35 @@ def white(
 def target(
     photo: Annotated[Path, typer.Argument(metavar="PHOTO", help="Photograph of a colour target.")],
     out: Annotated[Path, typer.Argument(metavar="CSV", help="Table of its patches to write.")],
+    target: Annotated[
+        str, typer.Option("--target", metavar="NAME", help="classic (24 patches) or sg (140).")
+    ] = "classic",
     grey: Annotated[
         bool, typer.Option("--grey", help="Only the neutral patches, for `calibrate oecf`.")
     ] = False,
+    wedge: Annotated[
+        int | None,
+        typer.Option("--wedge", metavar="N", help="Find a row of N grey patches instead."),
+    ] = None,
+    density: Annotated[
+        str | None,
+        typer.Option("--density", metavar="FIRST,STEP", help="Of the wedge's lightest patch, and the rise."),
+    ] = None,
     oecf: OecfFile = None,
     json: Json = None,
     debug: Debug = False,
 ) -> None:
-    """Find the classic colour target of 24 patches in a photograph."""
+    """Find a colour target or a grey wedge in a photograph, and write the table of its patches."""
     with reporting("calibrate target", json, debug) as report:
-        found = calibrate.target(photo, out, grey=grey, oecf=oecf)
+        found = calibrate.target(
+            photo,
+            out,
+            target=target,
+            grey=grey,
+            wedge=wedge,
+            density=None if density is None else numbers(density, 2, "--density"),
+            oecf=oecf,
+        )
         report.say_all(target_lines(found))
         report.done(found)
 

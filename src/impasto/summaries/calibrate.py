@@ -130,13 +130,15 @@ def colour_lines(found: Colour) -> Iterator[str]:
 
 
 def target_lines(found: Target) -> Iterator[str]:
-    """Yield what was found of a colour target, where to check it, and what takes the table."""
-    yield (
-        f"{found.name}: outlines of {found.seen} of 24 patches seen; colours within "
-        f"{found.difference:.1f} CIELAB in the mean, after the best matrix"
-    )
+    """Yield what was found of a target, where to check it, and what takes the table."""
+    seen = f"{found.name}: outlines of {found.seen} of {found.total} patches seen"
+    if found.difference is not None:
+        seen += f"; colours within {found.difference:.1f} CIELAB in the mean, after the best matrix"
+    yield seen
     yield f"check the outlines in {found.picture}; correct boxes in {found.file} if they are off"
-    step = "colour" if len(found.patches) == 24 else "oecf"
+    if found.next_step is None:
+        yield f"note: {found.file} does not say what is known: add a column density or reflectance"
+    step = found.next_step or "oecf"
     yield f"{found.file} is ready; next: impasto calibrate {step} PHOTO {found.file} {step}.json --card PHOTO"
 
 
