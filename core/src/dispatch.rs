@@ -148,7 +148,7 @@ macro_rules! dispatch {
 
                 pub fn fit(stack: &Stack, colour: &[f64], options: Options) -> Fitted {
                     with_instructions!(ISA => {
-                        let layout = Joint::<ISA>::layout(stack.channels, options.ambient);
+                        let layout = Joint::<ISA>::layout(stack, &options);
                         let make = || Joint::<ISA>::new(stack, colour, options);
                         fit_tile(stack.pixels, layout, make, joint_block::<ISA>)
                     })

@@ -11,9 +11,14 @@ use crate::observations::{Group, Stack};
 use crate::record::{FitBlock, Layout, Row, Status, groups};
 use crate::robust::Loss;
 use crate::separable::{Point, Scratch, Separable, Solution, propagated};
-use crate::start::{ASIDE, Grey, aside, candidates, doubt_shadows, grey, start, start_at, starts, wider_start};
+use crate::shadows::{self, Shadows};
+use crate::start::{
+    ASIDE, Grey, aside, candidates, diffuse_light, doubt_shadows, grey, start, start_at, starts, wider_start,
+};
 use std::marker::PhantomData;
 
+/// Reweightings of the fit by Lambert's law that tells the first shadows.
+const LAMBERT_ROUNDS: usize = 4;
 /// Rounds of a robust fit with a wider loss before the one with the loss asked for.
 const ROBUST_STAGES: usize = 2;
 /// Reduced χ² above which a fit may have ended at a lobe of the wrong width.
@@ -33,6 +38,8 @@ pub struct Options {
     pub loss: Loss,
     pub max_steps: usize,
     pub ambient: bool,
+    /// Whether samples in cast shadows are found and left out.
+    pub shadows: bool,
 }
 
 /// The fit of groups of pixels, with its buffers.
@@ -44,6 +51,9 @@ pub struct JointFit<'a, M, const ISA: Isa, const C: usize, const P: usize, const
     grey: Vec<Grey<ISA>>,
     /// Share of each light's weight that its samples keep at the start of a robust fit.
     kept: Vec<Lane<ISA>>,
+    shadows: Shadows<ISA, C>,
+    /// Diffuse light under each light, by which shadows are found.
+    diffuse: Vec<Lane<ISA>>,
     scratch: Scratch<ISA, C, P, L>,
     /// Across the plane of the lights, where they lie in one and the view does not.
     across: Option<[f64; 3]>,
@@ -51,8 +61,10 @@ pub struct JointFit<'a, M, const ISA: Isa, const C: usize, const P: usize, const
 }
 
 impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize> JointFit<'a, M, ISA, C, P, L> {
-    pub fn layout(channels: usize, ambient: bool) -> Layout {
-        Layout::joint(channels, M::LOBES, P - 2, if ambient { channels } else { 0 })
+    pub fn layout(stack: &Stack, options: &Options) -> Layout {
+        let ambient = if options.ambient { stack.channels } else { 0 };
+        let lights = if options.shadows { stack.lights.len() } else { 0 };
+        Layout::joint(stack.channels, M::LOBES, P - 2, ambient, lights)
     }
 
     /// Unknowns that each channel's samples must determine.
@@ -69,6 +81,8 @@ impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: u
             group: Group::new(stack, options.optics.index),
             grey: Vec::with_capacity(stack.lights.len()),
             kept: Vec::with_capacity(stack.lights.len()),
+            shadows: Shadows::new(stack.lights.len()),
+            diffuse: Vec::with_capacity(stack.lights.len()),
             scratch: Scratch::new(stack.lights.len()),
             across: across(&stack.lights, &stack.camera),
             model: PhantomData,
@@ -80,7 +94,7 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
     for JointFit<'_, M, ISA, C, P, L>
 {
     fn layout(&self) -> Layout {
-        Self::layout(self.stack.channels, self.options.ambient)
+        Self::layout(self.stack, &self.options)
     }
 
     #[inline(always)]
@@ -93,11 +107,60 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
 }
 
 impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize> JointFit<'_, M, ISA, C, P, L> {
+    /// Leaves out the samples in cast shadows: first those that Lambert's law tells, then those that the model tells which
+    /// is fitted to the others. Returns where that fit ends.
+    #[inline(always)]
+    fn leave_out_shadows(&mut self, first: usize, wanted: LaneMask) -> Point<ISA> {
+        let unknowns = self.unknowns();
+        let (optics, ambient) = (self.options.optics, self.options.ambient);
+        diffuse_light(&self.grey, &self.group.illuminations, LAMBERT_ROUNDS, &mut self.diffuse);
+        self.shadows.begin(&self.group, &self.grey);
+        let zero = Lane::splat(0.0);
+        self.shadows.leave_out(&self.diffuse, zero, wanted, unknowns, &mut self.group, &mut self.grey);
+        let known = self.stack.known_normal::<ISA>(first);
+        let illuminations = &self.group.illuminations;
+        let normals = match known {
+            Some(normal) => [normal; 2],
+            None => candidates(&self.grey, illuminations),
+        };
+        let mut point = start_of::<M, ISA, L>(&normals, &self.grey, illuminations, &optics, ambient, None);
+        let share = Lane::splat(1.0 / self.group.channels as f64);
+        let mut changed = wanted;
+        for _ in 0..shadows::ROUNDS {
+            let mut problem = Separable::<M, ISA, C, P, L>::new(
+                &self.group,
+                self.colour,
+                optics,
+                Loss::Linear,
+                ambient,
+                &mut self.scratch,
+            );
+            problem.hold_normal = known.is_some();
+            problem.prior = known.is_none();
+            let outcome = minimise(&mut problem, &point, changed, self.options.max_steps);
+            point = Separable::<M, ISA, C, P, L>::select(changed, &outcome.point, &point);
+            let magnitudes = problem.solve(&point).magnitudes;
+            let (mut diffuse, mut glow) = (zero, zero);
+            for k in 0..self.group.channels {
+                diffuse = magnitudes.diffuse[k].mul_add(share, diffuse);
+                glow = magnitudes.ambient[k].mul_add(share, glow);
+            }
+            problem.diffuse_light(diffuse, &mut self.diffuse);
+            problem.give_back(&mut self.scratch);
+            changed = self.shadows.leave_out(&self.diffuse, glow, changed, unknowns, &mut self.group, &mut self.grey);
+            if !changed.any() {
+                break;
+            }
+        }
+        point
+    }
+
     #[inline(always)]
     fn fit_group(&mut self, first: usize, rows: &mut [f32], status: &mut [u8]) {
         self.group.gather(self.stack, first);
         grey(&self.group, &mut self.grey);
         let wanted = !self.group.usable_lights.lt(Lane::splat(self.unknowns() as f64));
+        let unshadowed = if self.options.shadows { Some(self.leave_out_shadows(first, wanted)) } else { None };
         let illuminations = &self.group.illuminations;
         let (optics, ambient) = (self.options.optics, self.options.ambient);
         let robust = self.options.loss != Loss::Linear;
@@ -133,7 +196,10 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
                 });
                 explore(&mut problem, points, wanted, EXPLORING_STEPS).point
             }
-            (None, None) => find(&candidates(&self.grey, illuminations), None),
+            (None, None) => unshadowed.unwrap_or_else(
+                #[inline(always)]
+                || find(&candidates(&self.grey, illuminations), None),
+            ),
         };
         if robust {
             problem.robust.trust(&self.kept);
@@ -198,6 +264,7 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
 
         let channels = self.stack.channels;
         let ambients = if ambient { channels } else { 0 };
+        let shadowed = if self.options.shadows { &self.shadows.dark[..] } else { &[] };
         let width = FitBlock::layout(self).width();
         for (lane, status) in status.iter_mut().enumerate() {
             *status = if !wanted.holds(lane) {
@@ -227,6 +294,7 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
                 &solution.magnitudes,
                 &summary,
                 &deviations,
+                shadowed,
             );
         }
     }
@@ -371,6 +439,7 @@ fn write_row<const ISA: Isa, const C: usize, const L: usize>(
     magnitudes: &Magnitudes<ISA, C, L>,
     summary: &Summary<ISA>,
     deviations: &Deviations<ISA, C, L>,
+    shadowed: &[LaneMask],
 ) {
     row.extend(normal.iter().map(|x| x.0[lane]));
     row.extend(magnitudes.diffuse[..channels].iter().map(|x| x.0[lane]));
@@ -384,4 +453,5 @@ fn write_row<const ISA: Isa, const C: usize, const L: usize>(
     row.extend(deviations.specular[..lobes].iter().map(|x| x.0[lane]));
     row.extend(deviations.shape[..shapes].iter().map(|x| x.0[lane]));
     row.extend(deviations.ambient[..ambient].iter().map(|x| x.0[lane]));
+    row.extend(shadowed.iter().map(|dark| if dark.holds(lane) { 1.0 } else { 0.0 }));
 }

@@ -26,5 +26,6 @@ mod render;
 mod residual;
 mod robust;
 mod separable;
+mod shadows;
 mod slopes;
 mod start;

@@ -142,7 +142,7 @@ fn instructions() -> &'static str {
 #[pyfunction]
 #[pyo3(signature = (model, radiance, *, scale, offset, light_direction, light_position_mm, light_intensity,
     view_direction, camera_distance_mm, position_mm, light_rgb, clip_level, shadow_level, sample_mask, noise, index,
-    fresnel, loss, loss_scale, max_steps, paper=None, normal=None))]
+    fresnel, loss, loss_scale, max_steps, shadows=false, paper=None, normal=None))]
 #[allow(clippy::too_many_arguments)]
 fn fit<'py>(
     py: Python<'py>,
@@ -166,12 +166,13 @@ fn fit<'py>(
     loss: &str,
     loss_scale: f32,
     max_steps: usize,
+    shadows: bool,
     paper: Option<(f64, f64, bool, Option<[f64; 3]>)>,
     normal: Option<PyReadonlyArray2<f32>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (name, ambient) = parse_model(model)?;
     let optics = parse_optics(index, fresnel)?;
-    let options = Options { optics, loss: parse_loss(loss, loss_scale)?, max_steps, ambient };
+    let options = Options { optics, loss: parse_loss(loss, loss_scale)?, max_steps, ambient, shadows };
     let (samples, [lights, pixels, channels]) = radiance.parse()?;
     let places = parse_places(&light_direction, &light_position_mm)?;
     check("light_direction", places.len(), lights)?;

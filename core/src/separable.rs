@@ -368,6 +368,15 @@ impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: u
         })
     }
 
+    /// The diffuse light of a magnitude under each light, at the point that was looked at last.
+    #[inline(always)]
+    pub fn diffuse_light(&self, magnitude: Lane<ISA>, into: &mut Vec<Lane<ISA>>) {
+        into.clear();
+        for basis in &self.basis {
+            into.push(magnitude * basis.diffuse.value);
+        }
+    }
+
     /// The radiance that the model leaves over at a light.
     #[inline(always)]
     fn residual(&self, magnitudes: &Magnitudes<ISA, C, L>, light: usize) -> [Lane<ISA>; C] {

@@ -113,6 +113,21 @@ pub fn diffuse_normal<const ISA: Isa>(
     bounded(scaled_normal(grey, illuminations, rounds))
 }
 
+/// The diffuse light of each pixel under each light, by Lambert's normal in `rounds` of reweighted least squares.
+#[inline(always)]
+pub fn diffuse_light<const ISA: Isa>(
+    grey: &[Grey<ISA>],
+    illuminations: &[Illumination<Lane<ISA>>],
+    rounds: usize,
+    into: &mut Vec<Lane<ISA>>,
+) {
+    let scaled = scaled_normal(grey, illuminations, rounds);
+    into.clear();
+    for at in illuminations {
+        into.push(dot(scaled, at.light).max(Lane::splat(0.0)));
+    }
+}
+
 /// Takes weight from samples that are darker than the diffuse light around them explains: cast shadows. A robust loss would
 /// find them too, but not from a start that they have spoilt. Returns the share of weight that each light keeps.
 #[inline(always)]
@@ -122,15 +137,13 @@ pub fn doubt_shadows<const ISA: Isa>(
     kept: &mut Vec<Lane<ISA>>,
 ) {
     let zero = Lane::splat(0.0);
-    let scaled = scaled_normal(grey, illuminations, 8);
-    kept.clear();
-    for (sample, at) in grey.iter_mut().zip(illuminations) {
-        let expected = dot(scaled, at.light).max(zero);
+    diffuse_light(grey, illuminations, 8, kept);
+    for (sample, kept) in grey.iter_mut().zip(kept) {
+        let expected = *kept;
         // A tenth darker than expected halves the weight.
         let missing = (expected - sample.radiance).max(zero) / (expected * Lane::splat(0.1)).max(Lane::splat(1e-20));
-        let share = Lane::splat(1.0) / missing.mul_add(missing, Lane::splat(1.0));
-        sample.weight = sample.weight * share;
-        kept.push(share);
+        *kept = Lane::splat(1.0) / missing.mul_add(missing, Lane::splat(1.0));
+        sample.weight = sample.weight * *kept;
     }
 }
 

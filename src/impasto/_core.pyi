@@ -28,6 +28,7 @@ def fit(
     loss: str,
     loss_scale: float,
     max_steps: int,
+    shadows: bool = False,
     paper: tuple[float, float, bool, tuple[float, float, float] | None] | None = None,
     normal: NDArray[np.float32] | None = None,
 ) -> dict[str, NDArray[Any]]: ...

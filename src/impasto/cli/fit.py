@@ -66,6 +66,10 @@ def fit(
         float | None,
         typer.Option("--shadow-level", metavar="Y", help="Leave out samples darker than this radiance."),
     ] = FitOptions.shadow_level,
+    shadows: Annotated[
+        bool,
+        typer.Option("--shadows", help="Find samples in cast shadows, pixel by pixel, and leave them out."),
+    ] = FitOptions.shadows,
     residual: Annotated[
         bool,
         typer.Option("--residual", help="Describe what the model leaves over, over light direction."),
@@ -107,6 +111,7 @@ def fit(
             loss=loss,
             loss_scale=loss_scale,
             shadow_level=shadow_level,
+            shadows=shadows,
             exclude=tuple(exclude or ()),
             refined=refined,
             threshold_deg=_threshold(threshold),

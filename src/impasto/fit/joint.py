@@ -22,6 +22,7 @@ from impasto.fit.remainder import (
 )
 from impasto.fit.sample import Sample, sample_pixels
 from impasto.fit.self_calibration import Calibration, self_calibrate
+from impasto.fit.shadows import count_shadows, shadow_warnings
 from impasto.fit.strength import find_strength
 from impasto.fit.tile import fit_tile
 from impasto.geometry import Lights, position_mm, rows_and_columns
@@ -65,8 +66,9 @@ class Joint:
         *maps, status = stores.fit_maps(
             model.shape_names, lobes=model.lobes, ambient=model.ambient, channels=channels
         )
+        shadowed = [stores.shadowed_map()] if options.shadows else []
         residual = [stores.residual_map(options.residual_components)] if options.residual else []
-        self.maps = (*maps, *residual, status)
+        self.maps = (*maps, *shadowed, *residual, status)
         raise_problems(OptionError, self._problems())
 
     def _problems(self) -> list[Problem]:
@@ -116,7 +118,7 @@ class Joint:
                 "and As apart from that tilt: they rest on where the joint fit starts. --procedure paper "
                 "--refined says what it assumes instead",
             )
-        if self._options.residual or self._options.calibrates:
+        if self._options.residual or self._options.calibrates or self._options.shadows:
             sample = _SampledPixels(self, sample_pixels(self._stack, self.lights, show_progress))
             toe = sample.toe
             calibration = None
@@ -143,17 +145,21 @@ class Joint:
                 ):
                     attributes["residual"]["strength"] = strength
                 notes += _residual_notes(self._remainder.attributes)
+            if self._options.shadows:
+                notes += shadow_warnings(sample.shadowed(self._selected), self._selected.names)
         return Findings(attributes, notes)
 
     def conclude(self, read: Callable[..., Iterator[stores.Maps]]) -> Findings:
-        """Add nothing; see `Procedure.conclude`."""
-        return Findings()
+        """Count what lies in cast shadows, where these were left out; see `Procedure.conclude`."""
+        return count_shadows(read) if self._options.shadows else Findings()
 
     def fit(self, radiance: NDArray[Any], rows: slice, columns: slice) -> stores.Maps:
         """Fit a tile; see `Procedure.fit`."""
         row, column = rows_and_columns(rows, columns)
         values = radiance.reshape(len(radiance), -1, radiance.shape[-1])
         maps = self.fit_pixels(values, row, column, self._selected)
+        if self._options.shadows:
+            maps[stores.SHADOWED] = maps[stores.SHADOWED].mean(axis=1)
         remainder = self._remainder
         if remainder is not None:
             pixels = self.pixels(maps, row, column)
@@ -229,6 +235,10 @@ class _SampledPixels:
     @property
     def toe(self) -> float:
         return usual_toe(self.measured())
+
+    def shadowed(self, lights: Lights) -> NDArray[np.float32]:
+        shadowed: NDArray[np.float32] = self.fit(lights)[stores.SHADOWED]
+        return shadowed
 
     def left_over(self, lights: Lights) -> NDArray[np.float32]:
         pixels = self.procedure.pixels(self.fit(lights), self.sample.row, self.sample.column)

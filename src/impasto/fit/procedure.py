@@ -33,6 +33,9 @@ class FitOptions:
         Steps per pixel before its status becomes "step limit".
     shadow_level : float or None
         Relative radiance below which a sample is left out as shadowed.
+    shadows : bool
+        Whether the joint procedure finds the samples of each pixel that lie in a cast shadow, and leaves them
+        out.
     exclude : tuple of str
         Names of photographs to leave out.
     refined : bool
@@ -60,6 +63,7 @@ class FitOptions:
     loss_scale: float = 3.0
     max_steps: int = 60
     shadow_level: float | None = None
+    shadows: bool = False
     exclude: tuple[str, ...] = ()
     refined: bool = False
     threshold_deg: float | None = 35.0

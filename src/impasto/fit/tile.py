@@ -85,7 +85,8 @@ def fit_tile(
     -------
     dict of str to ndarray of shape (N[, k]), float32; ``status`` uint8
         By the names of `store.fit_maps`; by the paper's procedure without standard deviations and chi-square,
-        and with ``view_tilt``.
+        and with ``view_tilt``. Where cast shadows are left out, ``shadowed`` of shape (N, L) is 1 for samples
+        that lie in one, else 0.
     """
     from impasto import _core
 
@@ -112,6 +113,7 @@ def fit_tile(
         loss=options.loss,
         loss_scale=options.loss_scale,
         max_steps=options.max_steps,
+        shadows=options.shadows,
         paper=None if paper is None else (paper.threshold, paper.specular, paper.refined, paper.peak),
         normal=None if normal is None else _per_pixel(normal, pixels),
     )

@@ -29,6 +29,7 @@ _TITLES = {
     "sigma": "Roughness of the diffuse surface, sigma",
     "chi2_reduced": "Reduced chi-square",
     "residual_rms": "Residual",
+    "shadowed": "Cast shadows",
     "view_tilt": "Tilt of the view that suits the highlight",
     "status": "How the fit of each pixel ended",
 }
@@ -46,6 +47,7 @@ _LABELS = {
     "sigma": "sigma, radians (0 is Lambert)",
     "chi2_reduced": "reduced chi-square",
     "residual_rms": "RMS residual, relative radiance",
+    "shadowed": "share of the lights",
     "view_tilt": "θv in the arm's plane, radians",
 }
 _LOGARITHMIC = {

@@ -59,6 +59,7 @@ def stack_fill_value(dtype: np.dtype) -> float | int:
 
 
 RESIDUAL = "residual"
+SHADOWED = "shadowed"
 
 
 @dataclass(frozen=True)
@@ -140,6 +141,11 @@ def fit_maps(shape_names: tuple[str, ...], *, lobes: int, ambient: bool, channel
         Map("residual_rms", None, 1, "1", "root mean square residual in relative radiance"),
         Map("status", None, 1, "1", "how the fit of the pixel ended", dtype="uint8"),
     )
+
+
+def shadowed_map() -> Map:
+    """Return the map of how often a pixel lies in a cast shadow."""
+    return Map(SHADOWED, None, 1, "1", "share of the lights in whose cast shadow the pixel lies")
 
 
 def residual_map(components: int) -> Map:

@@ -26,7 +26,10 @@ from impasto.models import MODELS, ModelSpec
 __all__ = ["Paper"]
 
 _FOREIGN = dict.fromkeys(
-    ("loss", "loss_scale", "residual", "residual_components", "self_calibrate", "calibrate_directions"),
+    (
+        *("loss", "loss_scale", "shadows"),
+        *("residual", "residual_components", "self_calibrate", "calibrate_directions"),
+    ),
     "joint",
 )
 # What the highlight's width is told by, whatever model is fitted.
