@@ -108,6 +108,13 @@ def parse_model(name: str) -> ModelSpec:
     )
 
 
+def with_ambient(model: ModelSpec, ambient: bool) -> ModelSpec:
+    """Return the form of a model that has the ambient term, or that has not."""
+    plain = model.name.removesuffix("-no-ambient").removesuffix("-ambient")
+    forms = (MODELS[name] for name in (plain, f"{plain}-ambient", f"{plain}-no-ambient") if name in MODELS)
+    return next(form for form in forms if form.ambient == ambient)
+
+
 def basis(
     model: ModelSpec,
     normal: ArrayLike,

@@ -95,6 +95,13 @@ def fit(
             help="Whether self-calibration may correct the lights' directions.",
         ),
     ] = FitOptions.calibrate_directions,
+    choose_ambient: Annotated[
+        bool,
+        typer.Option(
+            "--choose-ambient",
+            help="Fit each model with or without its ambient term, whichever meets lights left out closer.",
+        ),
+    ] = False,
     exclude: Annotated[
         list[str] | None,
         typer.Option("--exclude", metavar="NAME", help="Photograph to leave out; may be repeated."),
@@ -126,6 +133,7 @@ def fit(
             store,
             procedure=procedure,
             options=options,
+            choose_ambient=choose_ambient,
             overwrite=overwrite,
             say=lambda note: report.say(f"note: {note}"),
             **more,

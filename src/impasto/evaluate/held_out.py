@@ -10,6 +10,7 @@ import numpy as np
 
 from impasto.capture.light_files import read_light_file
 from impasto.errors import CaptureError, OptionError, Problem, raise_problems
+from impasto.fit.sample import deal_lights
 from impasto.geometry import Lights, zenith_azimuth
 
 
@@ -53,8 +54,6 @@ def spread_lights(lights: Lights, count: int) -> list[int]:
 def fold_lights(lights: Lights, folds: int) -> list[list[int]]:
     """Divide lights into folds, each spread in elevation and azimuth, so that each is held out once.
 
-    The lights are ordered by their zenith angle, within 5° by azimuth, and dealt out in turn.
-
     Parameters
     ----------
     lights : Lights
@@ -75,9 +74,7 @@ def fold_lights(lights: Lights, folds: int) -> list[list[int]]:
     if not 2 <= folds <= len(lights):
         what = f"is not from 2 to {len(lights)}, the number of photographs"
         raise OptionError(Problem(f"--folds {folds}", what, "Choose a number in that range, such as 5"))
-    zenith, azimuth = zenith_azimuth(lights.direction)
-    order = np.lexsort((azimuth, np.floor(np.degrees(zenith) / 5.0)))
-    return [sorted(int(index) for index in order[first::folds]) for first in range(folds)]
+    return deal_lights(lights, folds)
 
 
 def named_lights(path: str | PathLike[str], names: tuple[str, ...]) -> list[int]:

@@ -14,6 +14,7 @@ import numpy as np
 from impasto import store as stores
 from impasto.arm import find_arm
 from impasto.errors import ImpastoError, OptionError, Problem, StoreError, raise_problems
+from impasto.fit import ambient
 from impasto.fit.joint import Joint
 from impasto.fit.paper import Paper
 from impasto.fit.procedure import Findings, FitOptions, Procedure
@@ -98,6 +99,7 @@ def fit(
     models: Iterable[str] = ("torrance-sparrow", "phong"),
     procedure: str | None = None,
     options: FitOptions | None = None,
+    choose_ambient: bool = False,
     overwrite: bool = False,
     show_progress: bool | None = None,
     say: Callable[[str], None] | None = None,
@@ -118,6 +120,9 @@ def fit(
         How to fit: a key of `PROCEDURES`. By default ``joint``, or, for lights in one plane, ``paper`` in its
         refined form where it is defined for the model.
     options : FitOptions, optional
+    choose_ambient : bool, optional
+        Whether each model is fitted with or without its ambient term, whichever its name says, as lights left
+        out bear out; see `ambient.choose_ambient`.
     overwrite : bool, optional
         Whether to compute fits again that are complete.
     show_progress : bool, optional
@@ -144,7 +149,10 @@ def fit(
     for note in notes:
         say(note)
     with stores.run(path, "fit") as log:
-        jobs = [_Job(path, stack, name, chosen) for name, chosen in procedures.items()]
+        found = {name: (made, Findings()) for name, made in procedures.items()}
+        if choose_ambient:
+            found = ambient.choose_ambient(stack, procedures, options or FitOptions(), show_progress)
+        jobs = [_Job(path, stack, name, *chosen) for name, chosen in found.items()]
         raise_problems(StoreError, [problem for job in jobs for problem in job.problems(overwrite)])
         needed = sum(job.bytes_to_write(overwrite) for job in jobs)
         raise_problems(StoreError, stores.no_room(path, needed))
@@ -257,13 +265,18 @@ class _Job:
     stack : Stack
     model : str
     procedure : Procedure
+    chosen : Findings
+        By what the model was chosen.
     """
 
-    def __init__(self, store: Path, stack: stores.Stack, model: str, procedure: Procedure) -> None:
+    def __init__(
+        self, store: Path, stack: stores.Stack, model: str, procedure: Procedure, chosen: Findings
+    ) -> None:
         self.store = store
         self.stack = stack
         self.model = model
         self.procedure = procedure
+        self.chosen = chosen
         self.size = stack.shape[1:3]
         settings = dict(procedure.attributes)
         self.attributes: dict[str, Any] = {
@@ -318,6 +331,7 @@ class _Job:
         if self._complete and not overwrite:
             self.notes = tuple((self.found or {}).get("notes", ()))
         else:
+            self._add(self.chosen)
             self._add(self.procedure.prepare(show_progress))
 
     def _add(self, findings: Findings) -> None:

@@ -54,7 +54,7 @@ class Joint:
 
     def __init__(self, stack: stores.Stack, model: ModelSpec, options: FitOptions) -> None:
         self._stack = stack
-        self._model = model
+        self.model = model
         self._options = options
         _, self._height, self._width, channels = stack.shape
         names = stack.lights.names
@@ -74,11 +74,11 @@ class Joint:
     def _problems(self) -> list[Problem]:
         problems = self._options.foreign(_FOREIGN, self.name)
         # Counted for one channel: the others of a grey pixel tell nothing more.
-        unknowns = 2 + len(self._model.shape_names) + 1 + self._model.lobes + int(self._model.ambient)
+        unknowns = 2 + len(self.model.shape_names) + 1 + self.model.lobes + int(self.model.ambient)
         if len(self.lights) < unknowns:
             problems.append(
                 Problem(
-                    where=f"--model {self._model.name}",
+                    where=f"--model {self.model.name}",
                     what=f"has {unknowns} unknowns per channel, and there are {len(self.lights)} lights",
                     do="Take more photographs, or fit a model with fewer parameters such as lambert",
                 )
@@ -96,10 +96,15 @@ class Joint:
         return problems
 
     @property
+    def stated_lights(self) -> Lights:
+        """The lights of its photographs, as the stack states them."""
+        return self._stack.lights.select(self.lights)
+
+    @property
     def attributes(self) -> dict[str, Any]:
         """Attributes of the fit."""
         return {
-            "model": self._model.name,
+            "model": self.model.name,
             "procedure": self.name,
             **self._options.attributes(_FOREIGN),
             "light_rgb": self._light_rgb.tolist(),
@@ -176,7 +181,7 @@ class Joint:
         if self._near and self._camera.mm_per_px is not None:
             position = position_mm(row, column, self._height, self._width, self._camera.mm_per_px)
         return fit_tile(
-            self._model,
+            self.model,
             values,
             lights=lights,
             camera=self._camera,
@@ -249,10 +254,7 @@ class _SampledPixels:
 
     def thinned(self, count: int) -> _SampledPixels:
         """Return about `count` of the pixels, or all of fewer."""
-        whole = self.sample
-        every = np.linspace(0, len(whole.row) - 1, min(count, len(whole.row))).astype(np.intp)
-        part = Sample(np.ascontiguousarray(whole.values[:, every]), whole.row[every], whole.column[every])
-        return _SampledPixels(self.procedure, part)
+        return _SampledPixels(self.procedure, self.sample.thinned(count))
 
 
 def _calibration_notes(found: Calibration) -> tuple[str, ...]:

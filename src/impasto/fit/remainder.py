@@ -128,8 +128,8 @@ def find_remainder(rest: Values, lights: Lights, toe: float, components: int) ->
         "fade": round(float(np.sin(np.radians(FADE_DEG))), 7),
         "kept": round(found.kept, 5),
         "left_out_db": {
-            "model": _decibels(np.diag(per_light)),
-            "with_residual": _decibels(process.left_out(per_light)),
+            "model": decibels(np.diag(per_light)),
+            "with_residual": decibels(process.left_out(per_light)),
         },
     }
     return Remainder(encoder, toe, attributes)
@@ -146,7 +146,7 @@ def left_out_db(rest: Values, lights: Lights) -> float:
     """
     _, moments = _moments(rest)
     per_light = np.trace(moments, axis1=1, axis2=3) / rest.shape[2]
-    return _decibels(choose_process(lights.direction, per_light).left_out(per_light))
+    return decibels(choose_process(lights.direction, per_light).left_out(per_light))
 
 
 def _moments(rest: Values) -> tuple[Array, Array]:
@@ -157,5 +157,6 @@ def _moments(rest: Values) -> tuple[Array, Array]:
     return samples, moments
 
 
-def _decibels(errors: Array) -> float:
+def decibels(errors: Array) -> float:
+    """Return mean squares (L,) on the residual's scale as decibels, their mean over the lights."""
     return round(float(-10.0 * np.log10(errors + 1e-12).mean()), 3)

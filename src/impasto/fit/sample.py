@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from impasto import store as stores
 from impasto.fit.streaming import read_tiles
+from impasto.geometry import Lights, zenith_azimuth
 from impasto.progress import progress
 
 # Enough for the second moments of some hundred samples per pixel, few enough to be fitted several times over.
@@ -34,6 +35,32 @@ class Sample:
     values: NDArray[Any]
     row: NDArray[np.intp]
     column: NDArray[np.intp]
+
+    def thinned(self, count: int) -> Sample:
+        """Return about `count` of the pixels, or all of fewer."""
+        every = np.linspace(0, len(self.row) - 1, min(count, len(self.row))).astype(np.intp)
+        return Sample(np.ascontiguousarray(self.values[:, every]), self.row[every], self.column[every])
+
+
+def deal_lights(lights: Lights, folds: int) -> list[list[int]]:
+    """Divide lights into folds, each spread in elevation and azimuth.
+
+    The lights are ordered by their zenith angle, within 5° by azimuth, and dealt out in turn.
+
+    Parameters
+    ----------
+    lights : Lights
+    folds : int
+        From 1 to as many as there are lights.
+
+    Returns
+    -------
+    list of list of int
+        Indices into `lights`, in rising order.
+    """
+    zenith, azimuth = zenith_azimuth(lights.direction)
+    order = np.lexsort((azimuth, np.floor(np.degrees(zenith) / 5.0)))
+    return [sorted(int(index) for index in order[first::folds]) for first in range(folds)]
 
 
 def sample_pixels(stack: stores.Stack, lights: Sequence[int], show_progress: bool | None) -> Sample:
