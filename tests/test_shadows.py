@@ -10,8 +10,10 @@ from impasto.capture.simulate.capture import set_up
 from impasto.capture.simulate.settings import Settings
 from impasto.errors import OptionError
 from impasto.fit import FitOptions, fit_tile
+from impasto.fit.deviating import deviating, tell_deviating
 from impasto.fit.shadows import shadow_warnings
 from impasto.models import parse_model
+from impasto.pixels import pixels_of_maps, render_pixels
 from impasto.store import Stack, open_fit, open_stack
 
 LIGHTS = 40
@@ -181,6 +183,42 @@ def test_a_light_much_weaker_than_stated_is_named(photographed):
     (note,) = shadow_warnings(shadowed, stated.names)
     assert stated.names[7] in note
     assert stated.names[6] not in note
+
+
+def soiled(seen):
+    """Return the radiance with dust on samples drawn at random and on much of photograph 5, and which."""
+    rng = np.random.default_rng(9)
+    radiance = np.array(seen.radiance)
+    dirty = rng.random(radiance.shape[:2]) < 0.003
+    dirty[5, : radiance.shape[1] // 10] = True
+    radiance[dirty] *= rng.uniform(1.6, 4.0, (dirty.sum(), 1)).astype(np.float32)
+    return radiance, dirty
+
+
+def found_deviating(seen, radiance):
+    maps = seen.fit(shadows=True, radiance=radiance)
+    row, column = np.divmod(np.arange(radiance.shape[1]), seen.stack.shape[2])
+    attributes = {"model": "torrance-sparrow", "light_rgb": seen.stack.light_rgb}
+    attributes |= {"index_of_refraction": 1.5, "fresnel": "facet"}
+    pixels = pixels_of_maps(attributes, seen.stack.shape[1:3], row, column, maps)
+    rendered = render_pixels(pixels, seen.stack.lights, seen.stack.camera)
+    measured = np.where(radiance < seen.stack.clip_level, radiance, np.float32(np.nan))
+    return deviating(measured, rendered, seen.stack.noise, maps["shadowed"].T > 0)
+
+
+def test_dirt_is_told_from_shadows_and_from_what_the_model_does_not_know(photographed, shared):
+    measured = shared / "reference" / "measured_brdf.npz"
+    seen = photographed(preset="still-life", relief_scale=2.5, measured=measured)
+    names = seen.stack.lights.names
+    clean = found_deviating(seen, seen.radiance)
+    assert clean.mean() < 1e-4
+    assert tell_deviating(clean, names).notes == ()
+    radiance, dirty = soiled(seen)
+    found = found_deviating(seen, radiance)
+    assert dirty[found].mean() > 0.97
+    assert found[dirty].mean() > 0.7
+    (note,) = tell_deviating(found, names).notes
+    assert f"most in {names[5]} (" in note
 
 
 def test_the_papers_procedure_has_no_such_option(painting):

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from impasto import store as stores
 from impasto.arm import find_arm
 from impasto.errors import OptionError, Problem, raise_problems
+from impasto.fit.deviating import deviating, tell_deviating
 from impasto.fit.procedure import Findings, FitOptions
 from impasto.fit.remainder import (
     Remainder,
@@ -96,6 +97,11 @@ class Joint:
         return problems
 
     @property
+    def noise(self) -> tuple[float, float, float]:
+        """Of the stack."""
+        return self._stack.noise
+
+    @property
     def stated_lights(self) -> Lights:
         """The lights of its photographs, as the stack states them."""
         return self._stack.lights.select(self.lights)
@@ -151,7 +157,10 @@ class Joint:
                     attributes["residual"]["strength"] = strength
                 notes += _residual_notes(self._remainder.attributes)
             if self._options.shadows:
-                notes += shadow_warnings(sample.shadowed(self._selected), self._selected.names)
+                shadowed, deviating = sample.outliers(self._selected)
+                dirt = tell_deviating(deviating, self._selected.names)
+                attributes |= dirt.attributes
+                notes += (*shadow_warnings(shadowed, self._selected.names), *dirt.notes)
         return Findings(attributes, notes)
 
     def conclude(self, read: Callable[..., Iterator[stores.Maps]]) -> Findings:
@@ -241,9 +250,15 @@ class _SampledPixels:
     def toe(self) -> float:
         return usual_toe(self.measured())
 
-    def shadowed(self, lights: Lights) -> NDArray[np.float32]:
-        shadowed: NDArray[np.float32] = self.fit(lights)[stores.SHADOWED]
-        return shadowed
+    def outliers(self, lights: Lights) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        """Return which samples (N, L) lie in shadow, and which (L, N) deviate otherwise."""
+        maps = self.fit(lights)
+        shadowed = maps[stores.SHADOWED]
+        measured = self.measured()
+        measured[self.procedure.clipped(measured)] = np.nan
+        radiance = self.radiance(maps, lights)
+        noise = self.procedure.noise
+        return shadowed, deviating(measured, radiance, noise, np.nan_to_num(shadowed).T > 0)
 
     def left_over(self, lights: Lights) -> NDArray[np.float32]:
         pixels = self.procedure.pixels(self.fit(lights), self.sample.row, self.sample.column)
