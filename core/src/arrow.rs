@@ -178,9 +178,10 @@ impl<const ISA: Isa, const C: usize, const L: usize> Arrow<ISA, C, L> {
         }
     }
 
-    /// Adds information from elsewhere: that a lobe's magnitude is 0 with this weight.
+    /// Adds information from elsewhere: what a lobe's magnitude is, with this weight.
     #[inline(always)]
-    pub fn add_ridge(&mut self, lobe: usize, weight: Lane<ISA>) {
+    pub fn add_ridge(&mut self, lobe: usize, weight: Lane<ISA>, magnitude: Lane<ISA>) {
+        self.right.specular[lobe] = weight.mul_add(magnitude, self.right.specular[lobe]);
         self.specular_specular[lobe][lobe] = self.specular_specular[lobe][lobe] + weight;
     }
 

@@ -6,7 +6,7 @@
 use crate::geometry::Illumination;
 use crate::joint::{JointFit, Options};
 use crate::lanes::{FUSED, Isa, LANES, PLAIN, WIDE, outlined};
-use crate::models::{Model, Optics, ShapeParameter};
+use crate::models::{Model, Optics, ShapeParameter, plain_coordinate};
 use crate::observations::Stack;
 use crate::paper::{PaperFit, Sample};
 use crate::record::{FitBlock, Layout};
@@ -28,6 +28,8 @@ pub struct Entry {
     pub title: String,
     pub citations: Vec<&'static str>,
     pub shape: &'static [ShapeParameter],
+    /// Mean and standard deviation of the weak prior of each shape parameter or its logarithm, if that is what the fit moves.
+    pub prior: Vec<Option<(f64, f64)>>,
     pub lobes: usize,
     pub ambient_by_default: bool,
     pub reciprocal: bool,
@@ -121,6 +123,11 @@ fn fit_tile<F: FitBlock>(
     Fitted { layout, rows, status }
 }
 
+fn plain_priors<M: Model<L>, const L: usize>() -> Vec<Option<(f64, f64)>> {
+    let coordinates = M::SHAPE.iter().enumerate().map(|(i, parameter)| (M::coordinate(i), plain_coordinate(parameter)));
+    coordinates.map(|(coordinate, plain)| (coordinate == plain).then_some(plain.prior)).collect()
+}
+
 macro_rules! dispatch {
     ($(($module:ident, $name:literal, $model:ty, $room:tt, $ambient:literal)),* $(,)?) => {
         $(
@@ -174,6 +181,10 @@ macro_rules! dispatch {
                     values.extend(&basis.specular[..<This as Model<$room>>::LOBES]);
                     values
                 }
+
+                pub fn specular_scale(shape: &[f64]) -> Vec<f64> {
+                    <This as Model<$room>>::specular_scale(shape)[..<This as Model<$room>>::LOBES].to_vec()
+                }
             }
         )*
 
@@ -184,6 +195,7 @@ macro_rules! dispatch {
                 title: <$model as Model<$room>>::title(),
                 citations: <$model as Model<$room>>::citations(),
                 shape: <$model as Model<$room>>::SHAPE,
+                prior: plain_priors::<$model, $room>(),
                 lobes: <$model as Model<$room>>::LOBES,
                 ambient_by_default: $ambient,
                 reciprocal: <$model as Model<$room>>::RECIPROCAL,
@@ -238,6 +250,14 @@ macro_rules! dispatch {
         ) -> Option<Vec<f64>> {
             match name {
                 $($name => Some($module::basis(normal, shape, at, optics)),)*
+                _ => None,
+            }
+        }
+
+        /// The specular magnitude of each lobe of a shape where κ = 4; `None` if no model has the name.
+        pub fn specular_scale(name: &str, shape: &[f64]) -> Option<Vec<f64>> {
+            match name {
+                $($name => Some($module::specular_scale(shape)),)*
                 _ => None,
             }
         }

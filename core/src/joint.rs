@@ -3,14 +3,14 @@
 use crate::arrow::Magnitudes;
 use crate::dual::Dual;
 use crate::geometry::{Illumination, across};
-use crate::lanes::{Isa, Lane, LaneMask};
+use crate::lanes::{Isa, LANES, Lane, LaneMask};
 use crate::minimise::{Objective, Outcome, inverse, minimise};
 use crate::models::{MAX_SHAPE, Model, Optics};
 use crate::number::{Mask, Number, Real, array};
-use crate::observations::{Group, Stack};
+use crate::observations::{Belief, Group, Stack};
 use crate::record::{FitBlock, Layout, Row, Status, groups};
 use crate::robust::Loss;
-use crate::separable::{Point, Scratch, Separable, Solution, propagated};
+use crate::separable::{Point, Prior, Scratch, Separable, Solution, propagated};
 use crate::shadows::{self, Shadows};
 use crate::start::{
     ASIDE, Grey, aside, candidates, diffuse_light, doubt_shadows, grey, start, start_at, starts, wider_start,
@@ -136,7 +136,7 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
                 &mut self.scratch,
             );
             problem.hold_normal = known.is_some();
-            problem.prior = known.is_none();
+            problem.prior = known.is_none().then(Prior::of_model::<M>);
             let outcome = minimise(&mut problem, &point, changed, self.options.max_steps);
             point = Separable::<M, ISA, C, P, L>::select(changed, &outcome.point, &point);
             let magnitudes = problem.solve(&point).magnitudes;
@@ -180,14 +180,23 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
             &mut self.scratch,
         );
         problem.hold_normal = known.is_some();
-        problem.prior = known.is_none();
-        let mut begin = match (known, self.across) {
-            (Some(normal), _) => {
+        let believed = self.stack.belief.map(|belief| believed::<M, ISA, L>(&belief, &self.stack.group(first)));
+        problem.prior = match &believed {
+            Some((_, prior)) => Some(*prior),
+            None => known.is_none().then(Prior::of_model::<M>),
+        };
+        let mut begin = match (believed, known, self.across) {
+            (Some((begin, prior)), _, _) => {
+                // From where a fit without the belief ended it may not find what is believed.
+                let believed = Point { coordinates: array!(|i| prior.shape[i].0), ..begin };
+                explore(&mut problem, [begin, believed].into_iter(), wanted, EXPLORING_STEPS).point
+            }
+            (None, Some(normal), _) => {
                 let shapes = starts::<M, ISA, L>().chain(wider_start::<M, ISA, L>());
                 let points = shapes.map(|coordinates| Point { normal, coordinates });
                 explore(&mut problem, points, wanted, EXPLORING_STEPS).point
             }
-            (None, Some(across)) => {
+            (None, None, Some(across)) => {
                 let normals = candidates(&self.grey, illuminations);
                 let points = ASIDE.iter().flat_map(|&angle| {
                     let normals = aside(&normals, across, angle);
@@ -196,7 +205,7 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
                 });
                 explore(&mut problem, points, wanted, EXPLORING_STEPS).point
             }
-            (None, None) => unshadowed.unwrap_or_else(
+            (None, None, None) => unshadowed.unwrap_or_else(
                 #[inline(always)]
                 || find(&candidates(&self.grey, illuminations), None),
             ),
@@ -224,7 +233,7 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
             doubtful = doubtful | (solution.quadratic.cost * problem.per_freedom).gt(Lane::splat(MISFIT));
         }
         doubtful = doubtful & wanted;
-        if known.is_none() && doubtful.any() {
+        if believed.is_none() && known.is_none() && doubtful.any() {
             let avoided = Some(Lane::select(trapped, Lane::splat(ANY_WIDTH), outcome.point.coordinates[0]));
             let normal = [outcome.point.normal];
             // A lobe that is not the better one after a few steps will not become it.
@@ -298,6 +307,38 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
             );
         }
     }
+}
+
+/// The start and the prior that are believed of a group of pixels.
+#[inline(always)]
+fn believed<M: Model<L>, const ISA: Isa, const L: usize>(
+    belief: &Belief,
+    pixel: &[usize; LANES],
+) -> (Point<ISA>, Prior<ISA, L>) {
+    let shapes = M::SHAPE.len();
+    let width = shapes + M::LOBES;
+    let normal = array!(|axis| Lane(array!(|i| belief.normal[3 * pixel[i] + axis])));
+    let mut point = Point { normal, coordinates: [Lane::splat(0.0); MAX_SHAPE] };
+    for (lane, pixel) in pixel.iter().enumerate() {
+        let shape = &belief.shape[shapes * pixel..shapes * (pixel + 1)];
+        let coordinates = M::coordinates(&array!(|i| shape.get(i).map_or(1.0, |&value| f64::from(value))));
+        for i in 0..shapes {
+            point.coordinates[i].0[lane] = coordinates[i] as f32;
+        }
+    }
+    let normal = |column: usize| {
+        let mean = Lane(array!(|i| belief.mean[width * pixel[i] + column]));
+        let deviation: Lane<ISA> = Lane(array!(|i| belief.deviation[width * pixel[i] + column]));
+        (mean, Lane::splat(1.0) / deviation.squared())
+    };
+    let mut prior = Prior::of_model::<M>();
+    for i in 0..shapes {
+        prior.shape[i] = normal(i);
+    }
+    for j in 0..M::LOBES {
+        prior.magnitude[j] = normal(shapes + j);
+    }
+    (point, prior)
 }
 
 /// The best of the model's starting shapes at the best of some normals, which a model of one lobe chooses.

@@ -63,6 +63,18 @@ pub struct Noise {
     pub relative: f32,
 }
 
+/// What is known of each pixel before its fit: where the search starts, and what stands in for the model's weak priors.
+#[derive(Clone, Copy)]
+pub struct Belief<'a> {
+    /// (pixel, 3): unit normals to start from.
+    pub normal: &'a [f32],
+    /// (pixel, shape parameter): shapes to start from.
+    pub shape: &'a [f32],
+    /// (pixel, coordinates then lobes): means and standard deviations of `separable::Prior`.
+    pub mean: &'a [f32],
+    pub deviation: &'a [f32],
+}
+
 /// Photographs of a tile of pixels, and where lights and camera stood.
 pub struct Stack<'a> {
     pub samples: Samples<'a>,
@@ -87,6 +99,7 @@ pub struct Stack<'a> {
     /// (pixel, 3): the normals, where the surface is known; they are then not fitted, and nothing else is assumed of the
     /// material either: the weak priors are off.
     pub normal: Option<&'a [f32]>,
+    pub belief: Option<Belief<'a>>,
 }
 
 impl Stack<'_> {
@@ -96,7 +109,7 @@ impl Stack<'_> {
 
     /// The pixels of a group from `start` on; past the end of the tile the last one is repeated.
     #[inline(always)]
-    fn group(&self, start: usize) -> [usize; LANES] {
+    pub fn group(&self, start: usize) -> [usize; LANES] {
         array!(|i| (start + i).min(self.pixels - 1))
     }
 

@@ -167,7 +167,7 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
         let enough = !self.far.usable_lights.lt(Lane::splat(unknowns as f64));
         let mut problem: Separable<'_, D, ISA, C, 2> =
             Separable::new(&self.far, colour, self.options.optics, Loss::Linear, false, &mut self.diffuse_scratch);
-        problem.prior = false;
+        problem.prior = None;
         let outcome = minimise(&mut problem, &begin, enough, self.options.max_steps);
         let magnitudes = problem.magnitudes();
         problem.give_back(&mut self.diffuse_scratch);
@@ -234,7 +234,7 @@ impl<'a, M: Model, const ISA: Isa, const C: usize> PaperFit<'a, M, ISA, C> {
         let begin = self.shape_fit.start_out_of_plane(&self.left);
         let mut problem: Separable<'_, M, ISA, C, 3> =
             Separable::new(&self.group, self.colour, self.options.optics, Loss::Linear, false, &mut self.scratch);
-        problem.prior = false;
+        problem.prior = None;
         problem.fixed_specular = Some([Lane::splat(self.sample.specular)]);
         let outcome = minimise(&mut problem, &begin, diffuse.enough, self.options.max_steps);
         let magnitudes = problem.magnitudes();

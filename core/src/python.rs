@@ -5,7 +5,7 @@ use crate::dispatch;
 use crate::geometry::{Illumination, Place};
 use crate::joint::Options;
 use crate::models::{FresnelAngle, Optics};
-use crate::observations::{Noise, Samples, Stack};
+use crate::observations::{Belief, Noise, Samples, Stack};
 use crate::paper::Sample;
 use crate::record::Layout;
 use crate::render::{Parameters, Scene};
@@ -111,7 +111,8 @@ fn models(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
     dispatch::entries()
         .into_iter()
         .map(|entry| {
-            let shape: Vec<_> = entry.shape.iter().map(|s| (s.name, s.lower, s.upper, s.meaning)).collect();
+            let shape = entry.shape.iter().zip(entry.prior);
+            let shape: Vec<_> = shape.map(|(s, prior)| (s.name, s.lower, s.upper, s.meaning, prior)).collect();
             let dict = PyDict::new(py);
             dict.set_item("name", entry.name)?;
             dict.set_item("title", entry.title)?;
@@ -138,11 +139,12 @@ fn instructions() -> &'static str {
 }
 
 /// Fits a model to every pixel of a tile; see `impasto.fit`. `paper` is (threshold in radians, As of the sample, refined, direction of the sample's peak or None for each pixel's own)
-/// for the paper's procedure; an As of NaN stops after its diffuse stage.
+/// for the paper's procedure; an As of NaN stops after its diffuse stage. `belief` is what is known of each pixel beforehand:
+/// normal, shape, mean and deviation; see `observations::Belief`.
 #[pyfunction]
 #[pyo3(signature = (model, radiance, *, scale, offset, light_direction, light_position_mm, light_intensity,
     view_direction, camera_distance_mm, position_mm, light_rgb, clip_level, shadow_level, sample_mask, noise, index,
-    fresnel, loss, loss_scale, max_steps, shadows=false, paper=None, normal=None))]
+    fresnel, loss, loss_scale, max_steps, shadows=false, paper=None, normal=None, belief=None))]
 #[allow(clippy::too_many_arguments)]
 fn fit<'py>(
     py: Python<'py>,
@@ -169,6 +171,7 @@ fn fit<'py>(
     shadows: bool,
     paper: Option<(f64, f64, bool, Option<[f64; 3]>)>,
     normal: Option<PyReadonlyArray2<f32>>,
+    belief: Option<[PyReadonlyArray2<f32>; 4]>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (name, ambient) = parse_model(model)?;
     let optics = parse_optics(index, fresnel)?;
@@ -186,6 +189,14 @@ fn fit<'py>(
     if let Some(normal) = &normal {
         check("normal", normal.len(), 3 * pixels)?;
     }
+    if let Some(belief) = &belief {
+        let entry = dispatch::entries().into_iter().find(|entry| entry.name == name).expect("parsed from this list");
+        let shapes = entry.shape.len();
+        let widths = [3, shapes, shapes + entry.lobes, shapes + entry.lobes];
+        for ((what, array), width) in ["normal", "shape", "mean", "deviation"].iter().zip(belief).zip(widths) {
+            check(&format!("belief's {what}"), array.len(), width * pixels)?;
+        }
+    }
     let stack = Stack {
         samples,
         pixels,
@@ -201,6 +212,15 @@ fn fit<'py>(
         sample_mask: sample_mask.as_ref().map(|array| array.as_slice()).transpose()?,
         noise: Noise { read: noise.0, photon: noise.1, relative: noise.2 },
         normal: normal.as_ref().map(|array| array.as_slice()).transpose()?,
+        belief: match &belief {
+            None => None,
+            Some([normal, shape, mean, deviation]) => Some(Belief {
+                normal: normal.as_slice()?,
+                shape: shape.as_slice()?,
+                mean: mean.as_slice()?,
+                deviation: deviation.as_slice()?,
+            }),
+        },
     };
     if stack.near() {
         let Some(position) = stack.position_mm else {
@@ -438,6 +458,21 @@ fn basis<'py>(
     Ok(values.into_pyarray(py).reshape([rows, width])?.into_any())
 }
 
+/// The specular magnitudes of shapes, (pixel, shape parameter), that reflect four times what a smooth varnish does (κ = 4),
+/// one for each lobe.
+#[pyfunction]
+fn specular_scale<'py>(py: Python<'py>, model: &str, shape: PyReadonlyArray2<f64>) -> PyResult<Bound<'py, PyAny>> {
+    let (name, _) = parse_model(model)?;
+    let entry = dispatch::entries().into_iter().find(|entry| entry.name == name).expect("parsed from this list");
+    let shape = shape.as_array();
+    check("shape", shape.ncols(), entry.shape.len())?;
+    let mut values = Vec::with_capacity(shape.nrows() * entry.lobes);
+    for row in shape.rows() {
+        values.extend(dispatch::specular_scale(name, &row.to_vec()).expect("parsed from the list"));
+    }
+    Ok(values.into_pyarray(py).reshape([shape.nrows(), entry.lobes])?.into_any())
+}
+
 /// Basis functions of pixels under lights, with their slopes; see `impasto.fit.information`.
 #[pyfunction]
 #[pyo3(signature = (model, normal, shape, *, light_direction, light_position_mm, view_direction, camera_distance_mm,
@@ -551,5 +586,8 @@ fn parse_grid<'a>(grid: &'a PyReadonlyArray3<'_, f32>) -> PyResult<Grid<'a>> {
 #[pymodule]
 mod _core {
     #[pymodule_export]
-    use super::{available_instructions, basis, basis_slopes, correct, fit, instructions, left_over, models, render};
+    use super::{
+        available_instructions, basis, basis_slopes, correct, fit, instructions, left_over, models, render,
+        specular_scale,
+    };
 }

@@ -29,6 +29,28 @@ pub struct Point<const ISA: Isa> {
     pub coordinates: [Lane<ISA>; MAX_SHAPE],
 }
 
+/// Independent normal priors: mean and inverse variance of each coordinate of the shape, and of each lobe's magnitude over
+/// `Model::specular_scale`. Each counts as one observation among the pixel's, at whatever level the residuals are.
+#[derive(Clone, Copy)]
+pub struct Prior<const ISA: Isa, const L: usize> {
+    pub shape: [(Lane<ISA>, Lane<ISA>); MAX_SHAPE],
+    pub magnitude: [(Lane<ISA>, Lane<ISA>); L],
+}
+
+impl<const ISA: Isa, const L: usize> Prior<ISA, L> {
+    /// The weak ones that hold for any material.
+    #[inline(always)]
+    pub fn of_model<M: Model<L>>() -> Self {
+        let (zero, one) = (Lane::splat(0.0), Lane::splat(1.0));
+        let mut prior = Prior { shape: [(zero, zero); MAX_SHAPE], magnitude: [(zero, one); L] };
+        for i in 0..M::SHAPE.len() {
+            let (mean, deviation) = M::coordinate(i).prior;
+            prior.shape[i] = (Lane::splat(mean), Lane::splat(1.0 / (deviation * deviation)));
+        }
+        prior
+    }
+}
+
 /// P is 2 + the number of shape parameters.
 pub struct Separable<'a, M, const ISA: Isa, const C: usize, const P: usize, const L: usize = 1> {
     pub observations: &'a [Observation<ISA, C>],
@@ -42,8 +64,8 @@ pub struct Separable<'a, M, const ISA: Isa, const C: usize, const P: usize, cons
     pub hold_normal: bool,
     /// Specular magnitude where it is known beforehand, as one value for a whole sample.
     pub fixed_specular: Option<[Lane<ISA>; L]>,
-    /// Whether weak priors stand in for highlights that no light has shown.
-    pub prior: bool,
+    /// Stands in for highlights that no light has shown.
+    pub prior: Option<Prior<ISA, L>>,
     /// 1 / degrees of freedom.
     pub per_freedom: Lane<ISA>,
     /// χ² per degree of freedom at the accepted point and at the one looked at last: the scale of the noise.
@@ -148,7 +170,7 @@ impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: u
             channels: group.channels,
             fixed_specular: None,
             hold_normal: false,
-            prior: true,
+            prior: Some(Prior::of_model::<M>()),
             noise_scale: Lane::splat(1.0),
             trial_noise_scale: Lane::splat(1.0),
             magnitudes: Magnitudes::zero(),
@@ -239,10 +261,13 @@ impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: u
             arrow.add(lobes, basis.diffuse.value, &specular, &radiance, &self.weight(light), &self.colour);
         }
         let specular_scale = M::specular_scale(&self.shape(point)[..P - 2]);
-        let ridge: [Lane<ISA>; L] = array!(|j| self.noise_scale / specular_scale[j].value.squared());
-        if self.prior {
+        let mut ridge = [zero; L];
+        if let Some(prior) = &self.prior {
             for j in 0..lobes {
-                arrow.add_ridge(j, ridge[j]);
+                let (mean, weight) = prior.magnitude[j];
+                let scale = specular_scale[j].value;
+                ridge[j] = self.noise_scale * weight / scale.squared();
+                arrow.add_ridge(j, ridge[j], mean * scale);
             }
         }
         let (mut magnitudes, factored) = arrow.magnitudes(lobes);
@@ -301,6 +326,27 @@ impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: u
             }
         }
 
+        self.trial_noise_scale = quadratic.cost * self.per_freedom;
+        self.trial_magnitudes = magnitudes;
+        if let Some(prior) = &self.prior {
+            // The ridge on the specular magnitudes: what they are compared with follows the shape.
+            for j in 0..lobes {
+                let magnitude = magnitudes.specular[j];
+                let scale = &specular_scale[j];
+                let residual = prior.magnitude[j].0 * scale.value - magnitude;
+                let weighted_residual = ridge[j] * residual;
+                quadratic.cost = weighted_residual.mul_add(residual, quadratic.cost);
+                let slope: [Lane<ISA>; P] = array!(|p| -magnitude * scale.derivative[p] / scale.value);
+                for p in 2..P {
+                    quadratic.descent[p] = slope[p].mul_add(weighted_residual, quadratic.descent[p]);
+                    for q in p..P {
+                        quadratic.hessian[p][q] = (ridge[j] * slope[p]).mul_add(slope[q], quadratic.hessian[p][q]);
+                    }
+                    projection[p].specular[j] = ridge[j].mul_add(slope[p], projection[p].specular[j]);
+                }
+            }
+        }
+
         // What the magnitudes can absorb of a step is taken out of the Hessian.
         let mut following = [Magnitudes::zero(); P];
         for p in 0..P {
@@ -314,19 +360,8 @@ impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: u
             }
             quadratic.hessian[p][p] = quadratic.hessian[p][p].max(floor);
         }
-        self.trial_noise_scale = quadratic.cost * self.per_freedom;
-        self.trial_magnitudes = magnitudes;
-        if self.prior {
-            self.add_shape_prior(point, &mut quadratic);
-            // The other half of the ridge on the specular magnitudes: their scale follows the shape.
-            for j in 0..lobes {
-                let term = ridge[j] * magnitudes.specular[j] * magnitudes.specular[j];
-                quadratic.cost = quadratic.cost + term;
-                for p in 2..P {
-                    let slope = specular_scale[j].derivative[p] / specular_scale[j].value;
-                    quadratic.descent[p] = term.mul_add(slope, quadratic.descent[p]);
-                }
-            }
+        if let Some(prior) = &self.prior {
+            self.add_shape_prior(&prior.shape, point, &mut quadratic);
         }
         Solution { quadratic, magnitudes, factored, following }
     }
@@ -341,17 +376,22 @@ impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: u
         M::shape(coordinates)
     }
 
-    /// A weak prior on the shape, which decides only where no highlight was seen: without it a lobe too narrow to fall on any
-    /// light, of any height, is as good as none.
+    /// The prior on the shape. The model's own is weak and decides only where no highlight was seen: without it a lobe too
+    /// narrow to fall on any light, of any height, is as good as none.
     ///
     /// The noise is known only roughly, so its scale is taken from the residuals: to minimise n ln χ² + p, the log posterior
     /// of n degrees of freedom under a prior −p/2, is to minimise χ² (1 + p/n) near the minimum.
     #[inline(always)]
-    fn add_shape_prior(&self, point: &Point<ISA>, quadratic: &mut Quadratic<ISA, P>) {
+    fn add_shape_prior(
+        &self,
+        prior: &[(Lane<ISA>, Lane<ISA>); MAX_SHAPE],
+        point: &Point<ISA>,
+        quadratic: &mut Quadratic<ISA, P>,
+    ) {
         for i in 0..P - 2 {
-            let (mean, deviation) = M::coordinate(i).prior;
-            let weight = self.trial_noise_scale * Lane::splat(1.0 / (deviation * deviation));
-            let distance = Lane::splat(mean) - point.coordinates[i];
+            let (mean, weight) = prior[i];
+            let weight = self.trial_noise_scale * weight;
+            let distance = mean - point.coordinates[i];
             quadratic.cost = (weight * distance).mul_add(distance, quadratic.cost);
             quadratic.descent[2 + i] = weight.mul_add(distance, quadratic.descent[2 + i]);
             quadratic.hessian[2 + i][2 + i] = quadratic.hessian[2 + i][2 + i] + weight;

@@ -31,6 +31,7 @@ def fit(
     shadows: bool = False,
     paper: tuple[float, float, bool, tuple[float, float, float] | None] | None = None,
     normal: NDArray[np.float32] | None = None,
+    belief: tuple[NDArray[np.float32], ...] | None = None,
 ) -> dict[str, NDArray[Any]]: ...
 def render(scene: dict[str, Any], residual: dict[str, Any] | None = None) -> NDArray[np.float32]: ...
 def left_over(
@@ -53,6 +54,7 @@ def basis(
     index: float,
     fresnel: str,
 ) -> NDArray[np.float64]: ...
+def specular_scale(model: str, shape: NDArray[np.float64]) -> NDArray[np.float64]: ...
 def basis_slopes(
     model: str,
     normal: NDArray[np.float64],

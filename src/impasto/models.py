@@ -18,12 +18,17 @@ from impasto.geometry import Array
 
 @dataclass(frozen=True)
 class ShapeParameter:
-    """A nonlinear parameter besides the normal: `name`, bounds and meaning in words."""
+    """A nonlinear parameter besides the normal: `name`, bounds and meaning in words.
+
+    `prior` holds mean and standard deviation of the fit's weak prior, of the logarithm where `lower` is
+    positive; None where the fit moves in another coordinate.
+    """
 
     name: str
     lower: float
     upper: float
     meaning: str
+    prior: tuple[float, float] | None
 
 
 @dataclass(frozen=True)

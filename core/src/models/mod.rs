@@ -74,7 +74,7 @@ impl ShapeParameter {
 }
 
 /// A number that the fit moves to change the shape: its range, and mean and standard deviation of its weak prior.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coordinate {
     pub lower: f64,
     pub upper: f64,
@@ -145,8 +145,9 @@ fn plain_coordinates(parameters: &[ShapeParameter], shape: &[f64; MAX_SHAPE]) ->
     coordinates
 }
 
+/// The coordinate of a parameter that is fitted in its logarithm, or as it is.
 #[inline(always)]
-fn plain_coordinate(parameter: &ShapeParameter) -> Coordinate {
+pub fn plain_coordinate(parameter: &ShapeParameter) -> Coordinate {
     let ShapeParameter { lower, upper, prior: (median, deviation), .. } = *parameter;
     if parameter.logarithmic() {
         Coordinate { lower: lower.ln(), upper: upper.ln(), prior: (median.ln(), deviation) }

@@ -36,6 +36,29 @@ class Sample:
     peak: tuple[float, float, float] | None = None
 
 
+@dataclass(frozen=True)
+class Belief:
+    """What is known of N pixels before their fit: where it starts, and its prior in place of the weak one.
+
+    The priors are normal and independent: of each shape parameter, or its logarithm where it is positive, and
+    of each lobe's As over `_core.specular_scale`. See docs/decisions/0014-reflectance-sharing.md.
+
+    Parameters
+    ----------
+    normal : ndarray of shape (N, 3), float32
+        Unit normals to start from.
+    shape : ndarray of shape (N, S), float32
+        Shape parameters to start from.
+    mean, deviation : ndarray of shape (N, S + lobes), float32
+        Of the priors.
+    """
+
+    normal: NDArray[np.float32]
+    shape: NDArray[np.float32]
+    mean: NDArray[np.float32]
+    deviation: NDArray[np.float32]
+
+
 def fit_tile(
     model: ModelSpec,
     radiance: NDArray[Any],
@@ -52,6 +75,7 @@ def fit_tile(
     paper: Sample | None = None,
     normal: ArrayLike | None = None,
     left_out: NDArray[np.bool_] | None = None,
+    belief: Belief | None = None,
 ) -> stores.Maps:
     """Fit a model to pixels: by the joint procedure, or by the paper's for a sample.
 
@@ -80,6 +104,8 @@ def fit_tile(
         which then assumes nothing of the material either.
     left_out : ndarray of shape (L, N), bool, optional
         Samples to be left out besides those that are clipped or missing.
+    belief : Belief, optional
+        What is known of each pixel beforehand, for the joint procedure.
 
     Returns
     -------
@@ -116,6 +142,7 @@ def fit_tile(
         shadows=options.shadows,
         paper=None if paper is None else (paper.threshold, paper.specular, paper.refined, paper.peak),
         normal=None if normal is None else _per_pixel(normal, pixels),
+        belief=None if belief is None else (belief.normal, belief.shape, belief.mean, belief.deviation),
     )
     for ending in ("", "_sd"):
         if f"normal{ending}" not in result:
