@@ -70,6 +70,13 @@ def fit(
         bool,
         typer.Option("--shadows", help="Find samples in cast shadows, pixel by pixel, and leave them out."),
     ] = FitOptions.shadows,
+    share_reflectance: Annotated[
+        bool,
+        typer.Option(
+            "--share-reflectance",
+            help="Where no light shows a pixel's highlight, lean on neighbours of the same colour.",
+        ),
+    ] = FitOptions.share_reflectance,
     residual: Annotated[
         bool,
         typer.Option("--residual", help="Describe what the model leaves over, over light direction."),
@@ -119,6 +126,7 @@ def fit(
             loss_scale=loss_scale,
             shadow_level=shadow_level,
             shadows=shadows,
+            share_reflectance=share_reflectance,
             exclude=tuple(exclude or ()),
             refined=refined,
             threshold_deg=_threshold(threshold),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,9 +22,11 @@ from impasto.fit.remainder import (
     left_over,
     usual_toe,
 )
-from impasto.fit.sample import Sample, sample_pixels
+from impasto.fit.sample import Sample, grid_pixels, sample_pixels
 from impasto.fit.self_calibration import Calibration, self_calibrate
 from impasto.fit.shadows import count_shadows, shadow_warnings
+from impasto.fit.sharing import STEP as SHARING_STEP
+from impasto.fit.sharing import Sharing, sharing_problems
 from impasto.fit.strength import find_strength
 from impasto.fit.tile import fit_tile
 from impasto.geometry import Lights, position_mm, rows_and_columns
@@ -63,6 +66,7 @@ class Joint:
         self._selected = stack.lights.select(self.lights)
         self._camera = stack.camera
         self._light_rgb = stack.light_rgb
+        self._sharing: Sharing | None = None
         self._remainder: Remainder | None = None
         *maps, status = stores.fit_maps(
             model.shape_names, lobes=model.lobes, ambient=model.ambient, channels=channels
@@ -84,6 +88,8 @@ class Joint:
                     do="Take more photographs, or fit a model with fewer parameters such as lambert",
                 )
             )
+        if self._options.share_reflectance:
+            problems += sharing_problems(self.model)
         near = self._selected.near or self._camera.distance_mm is not None
         if near and self._camera.mm_per_px is None:
             problems.append(
@@ -129,39 +135,52 @@ class Joint:
                 "and As apart from that tilt: they rest on where the joint fit starts. --procedure paper "
                 "--refined says what it assumes instead",
             )
+        calibration = None
         if self._options.residual or self._options.calibrates or self._options.shadows:
             sample = _SampledPixels(self, sample_pixels(self._stack, self.lights, show_progress))
             toe = sample.toe
-            calibration = None
-            if self._options.calibrates:
-                calibration = self_calibrate(
-                    sample,
-                    sample.thinned(_DIRECTION_PIXELS),
-                    self._selected,
-                    directions=self._options.calibrate_directions,
-                )
-                self._selected = calibration.lights
-                attributes["self_calibration"] = calibration.attributes()
-                notes += _calibration_notes(calibration)
-            if self._options.residual:
-                self._remainder = find_remainder(
-                    sample.left_over(self._selected),
-                    self._selected,
-                    toe,
-                    self._options.residual_components,
-                )
-                attributes["residual"] = self._remainder.attributes
-                if calibration is not None and (
-                    strength := find_strength(calibration.lights.direction, calibration.departure)
-                ):
-                    attributes["residual"]["strength"] = strength
-                notes += _residual_notes(self._remainder.attributes)
-            if self._options.shadows:
-                shadowed, deviating = sample.outliers(self._selected)
-                dirt = tell_deviating(deviating, self._selected.names)
-                attributes |= dirt.attributes
-                notes += (*shadow_warnings(shadowed, self._selected.names), *dirt.notes)
+        if self._options.calibrates:
+            calibration = self_calibrate(
+                sample,
+                sample.thinned(_DIRECTION_PIXELS),
+                self._selected,
+                directions=self._options.calibrate_directions,
+            )
+            self._selected = calibration.lights
+            attributes["self_calibration"] = calibration.attributes()
+            notes += _calibration_notes(calibration)
+        if self._options.share_reflectance:
+            self._sharing = self._find_sharing(show_progress)
+            attributes["reflectance_sharing"] = self._sharing.attributes
+            notes += _sharing_notes(self._sharing.attributes)
+        if self._options.residual:
+            self._remainder = find_remainder(
+                sample.left_over(self._selected),
+                self._selected,
+                toe,
+                self._options.residual_components,
+            )
+            attributes["residual"] = self._remainder.attributes
+            if calibration is not None and (
+                strength := find_strength(calibration.lights.direction, calibration.departure)
+            ):
+                attributes["residual"]["strength"] = strength
+            notes += _residual_notes(self._remainder.attributes)
+        if self._options.shadows:
+            shadowed, deviating = sample.outliers(self._selected)
+            dirt = tell_deviating(deviating, self._selected.names)
+            attributes |= dirt.attributes
+            notes += (*shadow_warnings(shadowed, self._selected.names), *dirt.notes)
         return Findings(attributes, notes)
+
+    def _find_sharing(self, show_progress: bool | None) -> Sharing:
+        """Fit every few pixels, and keep what they show."""
+        sharing = Sharing(self.model)
+        title = "Looking for highlights"
+        for part in grid_pixels(self._stack, self.lights, SHARING_STEP, title, show_progress):
+            fit = self._fitting(part.values, part.row, part.column, self._selected)
+            sharing.add(fit(belief=sharing.doubt(fit())), part.row, part.column)
+        return sharing
 
     def conclude(self, read: Callable[..., Iterator[stores.Maps]]) -> Findings:
         """Count what lies in cast shadows, where these were left out; see `Procedure.conclude`."""
@@ -186,10 +205,19 @@ class Joint:
         self, values: NDArray[Any], row: NDArray[np.intp], column: NDArray[np.intp], lights: Lights
     ) -> stores.Maps:
         """Fit pixels (L, N, C) that lie at rows and columns, as if lit by `lights`."""
+        fit = self._fitting(values, row, column, lights)
+        maps = fit()
+        return maps if self._sharing is None else fit(belief=self._sharing.belief(maps, row, column))
+
+    def _fitting(
+        self, values: NDArray[Any], row: NDArray[np.intp], column: NDArray[np.intp], lights: Lights
+    ) -> Callable[..., stores.Maps]:
+        """Return `fit_tile` with everything but the belief."""
         position = None
         if self._near and self._camera.mm_per_px is not None:
             position = position_mm(row, column, self._height, self._width, self._camera.mm_per_px)
-        return fit_tile(
+        return partial(
+            fit_tile,
             self.model,
             values,
             lights=lights,
@@ -288,6 +316,13 @@ def _calibration_notes(found: Calibration) -> tuple[str, ...]:
         "self-calibration: the strengths of the lights depart from their trend over direction by "
         f"{_rms(departure):.1f} % (rms), {departure.max():.0f} % at most. The attribute "
         "self_calibration lists them; --no-self-calibrate takes the lights as stated",
+    )
+
+
+def _sharing_notes(found: dict[str, Any]) -> tuple[str, ...]:
+    return (
+        f"reflectance sharing: {100 * found['shown']:.0f} % of the pixels show how wide their highlight is; "
+        "the others lean on those around them that have the same diffuse colour",
     )
 
 

@@ -36,6 +36,9 @@ class FitOptions:
     shadows : bool
         Whether the joint procedure finds the samples of each pixel that lie in a cast shadow, and leaves them
         out.
+    share_reflectance : bool
+        Whether the joint procedure fits a second time, with priors on the highlight from the pixels around
+        of the same diffuse colour; see docs/reflectance-sharing.md.
     exclude : tuple of str
         Names of photographs to leave out.
     refined : bool
@@ -64,6 +67,7 @@ class FitOptions:
     max_steps: int = 60
     shadow_level: float | None = None
     shadows: bool = False
+    share_reflectance: bool = False
     exclude: tuple[str, ...] = ()
     refined: bool = False
     threshold_deg: float | None = 35.0

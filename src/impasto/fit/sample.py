@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
@@ -81,8 +81,36 @@ def sample_pixels(stack: stores.Stack, lights: Sequence[int], show_progress: boo
     """
     _, height, width, _ = stack.shape
     step = max(1, math.isqrt(height * width // _PIXELS))
-    values, row, column = [], [], []
-    title = "Looking at a sample"
+    parts = list(grid_pixels(stack, lights, step, "Looking at a sample", show_progress))
+    return Sample(
+        np.concatenate([part.values for part in parts], axis=1),
+        np.concatenate([part.row for part in parts]),
+        np.concatenate([part.column for part in parts]),
+    )
+
+
+def grid_pixels(
+    stack: stores.Stack, lights: Sequence[int], step: int, title: str, show_progress: bool | None
+) -> Iterator[Sample]:
+    """Yield every `step`-th pixel of every `step`-th row, tile by tile.
+
+    Parameters
+    ----------
+    stack : Stack
+    lights : sequence of int
+        Which photographs.
+    step : int
+    title : str
+        What the progress bar says.
+    show_progress : bool or None
+        Whether to show it; by default, if standard error is a terminal.
+
+    Raises
+    ------
+    StoreError
+        If the stack is damaged.
+    """
+    _, height, width, _ = stack.shape
     with (
         progress(title, height * width, show=show_progress) as advance,
         closing(read_tiles(stack, lights, stores.units(height, width))) as tiles,
@@ -91,11 +119,9 @@ def sample_pixels(stack: stores.Stack, lights: Sequence[int], show_progress: boo
             # The grid is the whole picture's, so that it does not depend on how tiles are cut.
             first = [-(place.start + step // 2) % step for place in (rows, columns)]
             part = radiance[:, first[0] :: step, first[1] :: step]
-            values.append(part.reshape(len(part), -1, part.shape[-1]).copy())
-            grid = np.mgrid[
+            row, column = np.mgrid[
                 rows.start + first[0] : rows.stop : step, columns.start + first[1] : columns.stop : step
-            ]
-            row.append(grid[0].ravel())
-            column.append(grid[1].ravel())
+            ].reshape(2, -1)
+            if len(row):
+                yield Sample(part.reshape(len(part), -1, part.shape[-1]).copy(), row, column)
             advance(radiance.shape[1] * radiance.shape[2])
-    return Sample(np.concatenate(values, axis=1), np.concatenate(row), np.concatenate(column))

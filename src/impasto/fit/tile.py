@@ -58,6 +58,14 @@ class Belief:
     mean: NDArray[np.float32]
     deviation: NDArray[np.float32]
 
+    @property
+    def arrays(self) -> tuple[NDArray[np.float32], ...]:
+        """The four arrays in their order, as the core takes them."""
+        return tuple(
+            np.ascontiguousarray(values, np.float32)
+            for values in (self.normal, self.shape, self.mean, self.deviation)
+        )
+
 
 def fit_tile(
     model: ModelSpec,
@@ -142,7 +150,7 @@ def fit_tile(
         shadows=options.shadows,
         paper=None if paper is None else (paper.threshold, paper.specular, paper.refined, paper.peak),
         normal=None if normal is None else _per_pixel(normal, pixels),
-        belief=None if belief is None else (belief.normal, belief.shape, belief.mean, belief.deviation),
+        belief=None if belief is None else belief.arrays,
     )
     for ending in ("", "_sd"):
         if f"normal{ending}" not in result:

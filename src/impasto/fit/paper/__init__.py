@@ -27,7 +27,7 @@ __all__ = ["Paper"]
 
 _FOREIGN = dict.fromkeys(
     (
-        *("loss", "loss_scale", "shadows"),
+        *("loss", "loss_scale", "shadows", "share_reflectance"),
         *("residual", "residual_components", "self_calibrate", "calibrate_directions"),
     ),
     "joint",
