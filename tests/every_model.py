@@ -1,4 +1,4 @@
-"""A store with a fit of every model, its maps drawn at random; some have a residual term too."""
+"""A store with a fit of every model, its maps drawn at random; half with coloured highlights and residual."""
 
 import numpy as np
 
@@ -32,7 +32,13 @@ def write_every_model(folder, width, height):
     impasto.stack(photographs, store)
     channels = open_stack(store).shape[3]
     for spec in MODELS.values():
-        maps = fit_maps(spec.shape_names, lobes=spec.lobes, ambient=spec.ambient, channels=channels)
+        maps = fit_maps(
+            spec.shape_names,
+            lobes=spec.lobes,
+            ambient=spec.ambient,
+            channels=channels,
+            coloured=spec.ambient,  # for half of the models
+        )
         attributes = {
             "model": spec.name,
             "procedure": "joint",
@@ -41,7 +47,7 @@ def write_every_model(folder, width, height):
             "light_rgb": [1.04, 1.0, 0.96],
             "status_meaning": {},
         }
-        if spec.ambient:  # for half of the models
+        if spec.ambient:
             *others, status = maps
             maps = (*others, residual_map(COMPONENTS), status)
             attributes[RESIDUAL] = _random_residual(channels)
@@ -94,6 +100,8 @@ def _random_maps(spec, maps, unit):
         values[parameter.name] = draw(parameter.lower, parameter.upper)
     if spec.ambient:
         values["ambient"] = between(1e-3, 0.1, values["ambient"].shape[2])
+    if "specular_rgb" in values:
+        values["specular_rgb"] = between(0.3, 1.5, values["specular_rgb"].shape[2])
     values["status"][:] = 0
     if RESIDUAL in values:
         values[RESIDUAL] = ZERO + rng.normal(0, 1500, (*size, COMPONENTS)).clip(-ZERO, ZERO - 1)

@@ -206,3 +206,33 @@ def test_a_grey_stack_is_fitted_like_one_channel_of_a_colour_stack():
     error = np.abs(fitted["diffuse"][:, 0] / colour_problem.diffuse[:, 0] - 1)
     assert np.median(error) < 3 * np.median(np.abs(colour["diffuse"] / colour_problem.diffuse - 1))
     assert np.median(np.abs(fitted["chi2_reduced"] - 1)) < 0.3
+
+
+def test_a_highlight_may_have_a_colour_of_its_own():
+    model, gold = "torrance-sparrow-ambient", np.array([1.0, 0.8, 0.4])
+    maps, lights = truth(model), dome(60)
+    white = reference.radiance(model, **maps, light_direction=lights)
+    matte = reference.radiance(model, **(maps | {"specular": 0 * maps["specular"]}), light_direction=lights)
+    gilded = (matte + gold * (white - matte)).astype(np.float32)
+    found = fit(model, gilded, lights, coloured=True)
+    np.testing.assert_allclose(
+        found["specular_rgb"] / found["specular_rgb"][:, :1], gold * np.ones((24, 1)), rtol=0.03
+    )
+    plain = fit(model, gilded, lights)
+    assert "specular_rgb" not in plain
+    for name in ("residual_rms", "chi2_reduced"):
+        assert np.median(found[name] / plain[name]) < 0.25, name
+    error = [np.abs(each["diffuse"] - maps["diffuse"]).mean() for each in (found, plain)]
+    assert error[0] < 0.25 * error[1]
+    # White ones stay so, and where there is none nothing is said of its colour.
+    np.testing.assert_allclose(
+        fit(model, white.astype(np.float32), lights, coloured=True)["specular_rgb"], 1.0, atol=0.01
+    )
+    dull = fit(model, matte.astype(np.float32), lights, coloured=True)
+    np.testing.assert_allclose(dull["specular_rgb"][dull["specular"][:, 0] == 0], 1.0)
+
+
+def test_one_channel_has_no_colour():
+    maps = truth("torrance-sparrow")
+    grey = reference.radiance("torrance-sparrow", **maps, light_direction=dome(60))[..., :1]
+    assert "specular_rgb" not in fit("torrance-sparrow", grey.astype(np.float32), dome(60), coloured=True)

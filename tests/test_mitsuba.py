@@ -255,6 +255,7 @@ def test_rendering_of_a_relief(photographs):
         "specular": (1 / (4 * photographs["c"] ** 2)).astype(np.float32)[:, None],
         "shape": photographs["c"].astype(np.float32)[:, None],
         "ambient": None,
+        "specular_rgb": None,
         "view_tilt": None,
         **core_settings(photographs["lights"]),
     }

@@ -71,6 +71,7 @@ def render(model, normal, diffuse, specular, shape, ambient=None, *, light_direc
     settings = {
         "light_position_mm": np.full((lights, 3), np.nan),
         "light_intensity": np.ones((lights, channels)),
+        "specular_rgb": None,
         "view_tilt": None,
         "view_direction": np.array([0.0, 0.0, 1.0]),
         "camera_distance_mm": None,

@@ -187,7 +187,8 @@ def test_options_of_the_other_procedure_are_refused_and_do_not_identify_a_fit(bu
     with pytest.raises(OptionError, match="no option of the joint procedure"):
         impasto.fit(bumpy.store, procedure="joint", options=FitOptions(threshold_deg=20.0, refined=True))
     _, joint = fitted(bumpy, LITERAL, procedure="joint")
-    own = {"loss", "loss_scale", "shadows", "share_reflectance", "residual", "residual_components"}
+    own = {"loss", "loss_scale", "shadows", "share_reflectance", "highlight_colour"}
+    own |= {"residual", "residual_components"}
     own |= {"self_calibrate", "calibrate_directions"}
     assert set(joint["options"]) == {"max_steps", "shadow_level", "exclude", *own}
     _, paper = fitted(bumpy, LITERAL)

@@ -19,6 +19,7 @@ from impasto.geometry import Camera, Lights, arm_direction, dome_direction
 from impasto.pixels import Pixels, pixel_positions_mm, render_pixels
 from impasto.residual import ZERO, ResidualTerm, encode, kernel
 from impasto.store import open_fit, open_stack
+from store_files import write_capture
 
 RNG = np.random.default_rng(4)
 MODEL = "torrance-sparrow"
@@ -290,6 +291,38 @@ def test_a_fit_with_it_renders_closer_and_keeps_the_maps(painting, tmp_path):
         difference = encode(band.radiance, 0.01) - encode(photographs, 0.01)
         errors.append(np.nanmean(np.square(difference[photographs < stack.clip_level])))
     assert errors[1] < 0.8 * errors[0]
+
+
+@pytest.mark.parametrize(("metal", "used"), [((1.0, 0.7, 0.3), "own"), ((1.0, 1.0, 1.0), "white")])
+def test_highlights_have_a_colour_of_their_own_where_lights_left_out_ask_for_it(metal, used, tmp_path):
+    count, side = 40, 12
+    rng = np.random.default_rng(2)
+    pixels = replace(
+        flat(rng.uniform(0.05, 0.2, (side * side, 3))),
+        attributes={"model": MODEL, "light_rgb": [1.0, 1.0, 1.0]} | OPTICS,
+        normal=lights(side * side, 12, rng).astype(np.float32),
+        specular=rng.uniform(4.0, 6.0, (side * side, 1)).astype(np.float32),
+        shape=np.full((side * side, 1), 0.25, np.float32),
+        specular_rgb=np.tile(np.float32(metal), (side * side, 1)),
+    )
+    folder = write_capture(tmp_path / "photos", [np.zeros((side, side, 3), np.float32)] * count)
+    placed = Lights(
+        tuple(map(str, range(count))), np.loadtxt(folder / "lights.lp", skiprows=1, usecols=(1, 2, 3))
+    )
+    photographs = render_pixels(pixels, placed, CAMERA).reshape(count, side, side, 3)
+    photographs *= 0.5 / photographs.max() * rng.normal(1.0, 0.005, photographs.shape).astype(np.float32)
+    write_capture(folder, list(photographs))
+    impasto.stack(folder, tmp_path / "p.zarr")
+    options = FitOptions(residual=True, residual_components=6)
+    impasto.fit(tmp_path / "p.zarr", models=[MODEL], options=options)
+    fit = open_fit(tmp_path / "p.zarr", MODEL)
+    found = fit.attributes["highlight_colour"]
+    assert found["used"] == used
+    assert (found["left_out_db"]["own"] > found["left_out_db"]["white"] + 0.1) == (used == "own")
+    assert ("specular_rgb" in fit.names) == (used == "own")
+    if used == "own":
+        colour = fit.read(slice(0, side), slice(0, side), ["specular_rgb"])["specular_rgb"]
+        np.testing.assert_allclose(np.median(colour / colour[..., :1], axis=(0, 1)), metal, rtol=0.05)
 
 
 def test_renderings_of_even_light_do_not_follow_the_strengths(painting, tmp_path):

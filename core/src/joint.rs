@@ -40,6 +40,8 @@ pub struct Options {
     pub ambient: bool,
     /// Whether samples in cast shadows are found and left out.
     pub shadows: bool,
+    /// Whether highlights have a colour of their own, as a metal's have.
+    pub coloured: bool,
 }
 
 /// The fit of groups of pixels, with its buffers.
@@ -64,7 +66,12 @@ impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: u
     pub fn layout(stack: &Stack, options: &Options) -> Layout {
         let ambient = if options.ambient { stack.channels } else { 0 };
         let lights = if options.shadows { stack.lights.len() } else { 0 };
-        Layout::joint(stack.channels, M::LOBES, P - 2, ambient, lights)
+        Layout::joint(stack.channels, M::LOBES, P - 2, ambient, Self::colours(stack, options), lights)
+    }
+
+    /// How many numbers say a highlight's colour.
+    fn colours(stack: &Stack, options: &Options) -> usize {
+        if options.coloured && M::LOBES > 0 && stack.channels > 1 { stack.channels } else { 0 }
     }
 
     /// Unknowns that each channel's samples must determine.
@@ -265,13 +272,19 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
             outcome.point.coordinates = M::ordered(outcome.point.coordinates);
             solution = problem.solve(&outcome.point);
         }
-        let summary = summarise(&problem, &solution, &self.group.irradiance);
+        let channels = self.stack.channels;
+        let colours = Self::colours(self.stack, &self.options);
+        let (magnitudes, colour) = if colours > 0 {
+            problem.coloured(&solution.magnitudes)
+        } else {
+            (solution.magnitudes, [Lane::splat(1.0); C])
+        };
+        let summary = summarise(&problem, &magnitudes, &colour, colours, &self.group.irradiance);
         let at_bound = problem.at_bound(&outcome.point, &solution.magnitudes);
         let shape = problem.shape(&outcome.point);
         let deviations = Deviations::new(M::LOBES, &solution, &shape, summary.chi2_reduced);
         problem.give_back(&mut self.scratch);
 
-        let channels = self.stack.channels;
         let ambients = if ambient { channels } else { 0 };
         let shadowed = if self.options.shadows { &self.shadows.dark[..] } else { &[] };
         let width = FitBlock::layout(self).width();
@@ -296,11 +309,12 @@ impl<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize
             }
             write_row(
                 Row::new(row),
-                [channels, M::LOBES, P - 2, ambients],
+                [channels, M::LOBES, P - 2, ambients, colours],
                 lane,
                 &outcome.point.normal,
                 &array!(|i| shape[i].value),
-                &solution.magnitudes,
+                &magnitudes,
+                &colour,
                 &summary,
                 &deviations,
                 shadowed,
@@ -385,7 +399,9 @@ struct Summary<const ISA: Isa> {
 #[inline(always)]
 fn summarise<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: usize>(
     problem: &Separable<'_, M, ISA, C, P, L>,
-    solution: &Solution<ISA, C, P, L>,
+    magnitudes: &Magnitudes<ISA, C, L>,
+    colour: &[Lane<ISA>; C],
+    colours: usize,
     irradiance: &[[Lane<ISA>; C]],
 ) -> Summary<ISA> {
     let (zero, one) = (Lane::splat(0.0), Lane::splat(1.0));
@@ -393,7 +409,7 @@ fn summarise<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const 
     let mut chi2 = zero;
     let mut squares = zero;
     for (light, observation) in problem.observations.iter().enumerate() {
-        let predicted = problem.predicted(&solution.magnitudes, light);
+        let predicted = problem.predicted(magnitudes, colour, light);
         for k in 0..C {
             let residual = observation.radiance[k] - predicted[k];
             let measured = residual * irradiance[light][k];
@@ -403,7 +419,7 @@ fn summarise<M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const 
             chi2 = chi2 + observation.weight[k] * residual * residual;
         }
     }
-    let unknowns = P + M::LOBES + problem.channels * (1 + usize::from(problem.ambient));
+    let unknowns = P + M::LOBES + problem.channels * (1 + usize::from(problem.ambient)) + colours.saturating_sub(1);
     let freedom = (samples - Lane::splat(unknowns as f64)).max(one);
     Summary { chi2_reduced: chi2 / freedom, residual_rms: (squares / samples.max(one)).sqrt() }
 }
@@ -473,11 +489,12 @@ impl<const ISA: Isa, const C: usize, const L: usize> Deviations<ISA, C, L> {
 #[allow(clippy::too_many_arguments)]
 fn write_row<const ISA: Isa, const C: usize, const L: usize>(
     mut row: Row,
-    [channels, lobes, shapes, ambient]: [usize; 4],
+    [channels, lobes, shapes, ambient, colours]: [usize; 5],
     lane: usize,
     normal: &[Lane<ISA>; 3],
     shape: &[Lane<ISA>; MAX_SHAPE],
     magnitudes: &Magnitudes<ISA, C, L>,
+    colour: &[Lane<ISA>; C],
     summary: &Summary<ISA>,
     deviations: &Deviations<ISA, C, L>,
     shadowed: &[LaneMask],
@@ -487,6 +504,7 @@ fn write_row<const ISA: Isa, const C: usize, const L: usize>(
     row.extend(magnitudes.specular[..lobes].iter().map(|x| x.0[lane]));
     row.extend(shape[..shapes].iter().map(|x| x.0[lane]));
     row.extend(magnitudes.ambient[..ambient].iter().map(|x| x.0[lane]));
+    row.extend(colour[..colours].iter().map(|x| x.0[lane]));
     row.push(summary.chi2_reduced.0[lane]);
     row.push(summary.residual_rms.0[lane]);
     row.push(deviations.normal.0[lane]);

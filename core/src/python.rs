@@ -144,7 +144,7 @@ fn instructions() -> &'static str {
 #[pyfunction]
 #[pyo3(signature = (model, radiance, *, scale, offset, light_direction, light_position_mm, light_intensity,
     view_direction, camera_distance_mm, position_mm, light_rgb, clip_level, shadow_level, sample_mask, noise, index,
-    fresnel, loss, loss_scale, max_steps, shadows=false, paper=None, normal=None, belief=None))]
+    fresnel, loss, loss_scale, max_steps, shadows=false, coloured=false, paper=None, normal=None, belief=None))]
 #[allow(clippy::too_many_arguments)]
 fn fit<'py>(
     py: Python<'py>,
@@ -169,13 +169,15 @@ fn fit<'py>(
     loss_scale: f32,
     max_steps: usize,
     shadows: bool,
+    coloured: bool,
     paper: Option<(f64, f64, bool, Option<[f64; 3]>)>,
     normal: Option<PyReadonlyArray2<f32>>,
     belief: Option<[PyReadonlyArray2<f32>; 4]>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (name, ambient) = parse_model(model)?;
     let optics = parse_optics(index, fresnel)?;
-    let options = Options { optics, loss: parse_loss(loss, loss_scale)?, max_steps, ambient, shadows };
+    let loss = parse_loss(loss, loss_scale)?;
+    let options = Options { optics, loss, max_steps, ambient, shadows, coloured };
     let (samples, [lights, pixels, channels]) = radiance.parse()?;
     let places = parse_places(&light_direction, &light_position_mm)?;
     check("light_direction", places.len(), lights)?;
@@ -273,6 +275,7 @@ struct SceneItems<'py> {
     specular: PyReadonlyArray2<'py, f32>,
     shape: PyReadonlyArray2<'py, f32>,
     ambient: Option<PyReadonlyArray2<'py, f32>>,
+    specular_rgb: Option<PyReadonlyArray2<'py, f32>>,
     view_tilt: Option<PyReadonlyArray1<'py, f32>>,
     light_direction: PyReadonlyArray2<'py, f64>,
     light_position_mm: PyReadonlyArray2<'py, f64>,
@@ -296,6 +299,7 @@ impl SceneItems<'_> {
             specular: self.specular.as_slice()?,
             shape: self.shape.as_slice()?,
             ambient: self.ambient.as_ref().map_or(Ok(&[][..]), |array| array.as_slice())?,
+            specular_rgb: self.specular_rgb.as_ref().map_or(Ok(&[][..]), |array| array.as_slice())?,
             view_tilt: self.view_tilt.as_ref().map_or(Ok(&[][..]), |array| array.as_slice())?,
         };
         let scene = Scene {
@@ -315,6 +319,9 @@ impl SceneItems<'_> {
         check("shape", parameters.shape.len(), entry.shape.len() * pixels)?;
         if !parameters.ambient.is_empty() {
             check("ambient", parameters.ambient.len(), channels * pixels)?;
+        }
+        if !parameters.specular_rgb.is_empty() {
+            check("specular_rgb", parameters.specular_rgb.len(), channels * pixels)?;
         }
         if !parameters.view_tilt.is_empty() {
             check("view_tilt", parameters.view_tilt.len(), pixels)?;

@@ -14,7 +14,7 @@ pub enum Status {
     NotIdentified = 5,
 }
 
-const MAX_COLUMNS: usize = 13;
+const MAX_COLUMNS: usize = 14;
 const UNUSED: (&str, usize) = ("", 0);
 
 /// What a fit writes for a pixel: the name and the number of columns of each quantity, in order.
@@ -24,9 +24,16 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// A joint fit's row; `ambient` is the number of ambient magnitudes, `lights` that of the lights of which it is told
-    /// whether the pixel lies in their shadow.
-    pub const fn joint(channels: usize, lobes: usize, shape: usize, ambient: usize, lights: usize) -> Self {
+    /// A joint fit's row; `ambient` is the number of ambient magnitudes, `colours` that of a highlight's colour, `lights` that
+    /// of the lights of which it is told whether the pixel lies in their shadow.
+    pub const fn joint(
+        channels: usize,
+        lobes: usize,
+        shape: usize,
+        ambient: usize,
+        colours: usize,
+        lights: usize,
+    ) -> Self {
         Layout {
             columns: [
                 ("normal", 3),
@@ -34,6 +41,7 @@ impl Layout {
                 ("specular", lobes),
                 ("shape", shape),
                 ("ambient", ambient),
+                ("specular_rgb", colours),
                 ("chi2_reduced", 1),
                 ("residual_rms", 1),
                 ("normal_sd", 1),
@@ -57,6 +65,7 @@ impl Layout {
                 ("ambient", channels),
                 ("residual_rms", 1),
                 ("view_tilt", 1),
+                UNUSED,
                 UNUSED,
                 UNUSED,
                 UNUSED,

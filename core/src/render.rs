@@ -18,6 +18,8 @@ pub struct Parameters<'a> {
     pub shape: &'a [f32],
     /// Empty for a model without ambient term.
     pub ambient: &'a [f32],
+    /// Colour of the highlight over that of the light; empty where that is 1.
+    pub specular_rgb: &'a [f32],
     /// Tilt θv of the view in the arm's plane, which the paper's procedure fits per pixel; empty for the camera's own view.
     pub view_tilt: &'a [f32],
 }
@@ -144,6 +146,9 @@ pub fn shade<M: Model<L>, const ISA: Isa, const L: usize>(scene: &Scene, first: 
         }
         for k in 0..channels {
             let mut sum = lobes * Lane::splat(scene.colour[k]);
+            if !parameters.specular_rgb.is_empty() {
+                sum = sum * column(parameters.specular_rgb, channels, k);
+            }
             if !parameters.ambient.is_empty() {
                 sum = sum + column(parameters.ambient, channels, k);
             }

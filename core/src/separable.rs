@@ -21,6 +21,8 @@ pub const NORMAL_Z_MIN: f64 = 0.1;
 const TURN_MAX: f64 = 0.5;
 /// … and changes a coordinate of the shape by at most this.
 const SHAPE_STEP_MAX: f64 = 1.2;
+/// Standard deviation of a highlight's colour from white: gold reflects 0.4 times as much blue as red.
+const COLOUR_SD: f64 = 1.0;
 
 /// Normal and coordinates of the shape.
 #[derive(Clone, Copy)]
@@ -398,13 +400,49 @@ impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: u
         }
     }
 
-    /// The radiance that the model gives at a light, per unit of irradiance.
+    /// The colour of the highlight over that of the light, and the diffuse and ambient magnitudes that go with it: each
+    /// channel for itself, at normal, shape and specular magnitudes of the point that was solved last. A weak prior makes
+    /// highlights that no light has shown white.
     #[inline(always)]
-    pub fn predicted(&self, magnitudes: &Magnitudes<ISA, C, L>, light: usize) -> [Lane<ISA>; C] {
+    pub fn coloured(&self, magnitudes: &Magnitudes<ISA, C, L>) -> (Magnitudes<ISA, C, L>, [Lane<ISA>; C]) {
+        let one = Lane::splat(1.0);
+        let mut arrows = [Arrow::<ISA, 1>::new(self.ambient); C];
+        for (light, observation) in self.observations.iter().enumerate() {
+            let highlight = self.lobe_sum(magnitudes, light).value;
+            let (diffuse, weight) = (self.basis[light].diffuse.value, self.weight(light));
+            for k in 0..C {
+                let (radiance, weight, colour) = ([observation.radiance[k]], [weight[k]], [self.colour[k]]);
+                arrows[k].add(1, diffuse, &[highlight], &radiance, &weight, &colour);
+            }
+        }
+        let mut seen = LaneMask::NONE;
+        for j in 0..M::LOBES {
+            seen = seen | magnitudes.specular[j].positive();
+        }
+        let prior = self.noise_scale * Lane::splat(1.0 / (COLOUR_SD * COLOUR_SD));
+        let (mut coloured, mut colour) = (*magnitudes, [one; C]);
+        for (k, arrow) in arrows.iter_mut().enumerate().take(self.channels) {
+            arrow.add_ridge(0, prior, one);
+            let found = arrow.magnitudes(1).0;
+            coloured.diffuse[k] = Lane::select(seen, found.diffuse[0], magnitudes.diffuse[k]);
+            coloured.ambient[k] = Lane::select(seen, found.ambient[0], magnitudes.ambient[k]);
+            colour[k] = Lane::select(seen, found.specular[0], one);
+        }
+        (coloured, colour)
+    }
+
+    /// The radiance that the model gives at a light, per unit of irradiance, with highlights of a colour.
+    #[inline(always)]
+    pub fn predicted(
+        &self,
+        magnitudes: &Magnitudes<ISA, C, L>,
+        colour: &[Lane<ISA>; C],
+        light: usize,
+    ) -> [Lane<ISA>; C] {
         let sum = self.lobe_sum(magnitudes, light).value;
         array!(|k| {
             let diffuse = magnitudes.diffuse[k].mul_add(self.basis[light].diffuse.value, magnitudes.ambient[k]);
-            self.colour[k].mul_add(sum, diffuse)
+            (self.colour[k] * colour[k]).mul_add(sum, diffuse)
         })
     }
 
@@ -420,7 +458,7 @@ impl<'a, M: Model<L>, const ISA: Isa, const C: usize, const P: usize, const L: u
     /// The radiance that the model leaves over at a light.
     #[inline(always)]
     fn residual(&self, magnitudes: &Magnitudes<ISA, C, L>, light: usize) -> [Lane<ISA>; C] {
-        let predicted = self.predicted(magnitudes, light);
+        let predicted = self.predicted(magnitudes, &[Lane::splat(1.0); C], light);
         array!(|k| self.observations[light].radiance[k] - predicted[k])
     }
 

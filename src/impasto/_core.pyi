@@ -29,6 +29,7 @@ def fit(
     loss_scale: float,
     max_steps: int,
     shadows: bool = False,
+    coloured: bool = False,
     paper: tuple[float, float, bool, tuple[float, float, float] | None] | None = None,
     normal: NDArray[np.float32] | None = None,
     belief: tuple[NDArray[np.float32], ...] | None = None,

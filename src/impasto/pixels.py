@@ -21,7 +21,10 @@ Map = NDArray[np.float32]
 # Rec. 709: luminance of linear sRGB.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
-_PER_PIXEL = ("row", "column", "normal", "diffuse", "specular", "shape", "ambient", "view_tilt", "residual")
+_PER_PIXEL = (
+    *("row", "column", "normal", "diffuse", "specular", "shape", "ambient", "specular_rgb", "view_tilt"),
+    "residual",
+)
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,8 @@ class Pixels:
         For models with the term.
     view_tilt : ndarray of shape (P,) or None
         The view of each pixel, in the plane of the arm, as the paper's procedure has it in its literal form.
+    specular_rgb : ndarray of shape (P, C) or None
+        Colour of the highlight over that of the light; None for white.
     residual : ndarray of shape (P, K), uint16 (of a published store uint8), or None
         Codes of what the model leaves over; None leaves it away.
     """
@@ -58,6 +63,7 @@ class Pixels:
     shape: Map
     ambient: Map | None
     view_tilt: Map | None
+    specular_rgb: Map | None = None
     residual: NDArray[np.unsignedinteger] | None = None
 
     def __len__(self) -> int:
@@ -72,6 +78,12 @@ class Pixels:
     def light_rgb(self) -> Array:
         """Colour of the specular term, shape (C,)."""
         return np.asarray(self.attributes["light_rgb"], np.float64)
+
+    @property
+    def highlight_rgb(self) -> Array:
+        """Colour of each pixel's highlight, shape (P, C)."""
+        colour = np.ones_like(self.diffuse) if self.specular_rgb is None else self.specular_rgb
+        return colour * self.light_rgb
 
     @property
     def albedo(self) -> Array:
@@ -152,6 +164,7 @@ def read_pixels(fit: Fit, rows: slice, columns: slice, *, residual: bool = False
     names = ["normal", "diffuse", *spec.shape_names]
     names += ["specular"] if spec.lobes else []
     names += ["ambient"] if spec.ambient else []
+    names += ["specular_rgb"] if "specular_rgb" in fit.names else []
     names += ["view_tilt"] if "view_tilt" in fit.names else []
     names += ["residual"] if residual and "residual" in fit.names else []
     maps = fit.read(rows, columns, names)
@@ -198,6 +211,7 @@ def pixels_of_maps(
         shape=np.concatenate([none, *(flat(name) for name in spec.shape_names)], axis=1),
         ambient=flat("ambient") if spec.ambient else None,
         view_tilt=flat("view_tilt")[:, 0] if "view_tilt" in maps else None,
+        specular_rgb=flat("specular_rgb") if "specular_rgb" in maps else None,
         residual=flat("residual") if "residual" in maps else None,
     )
 
@@ -227,6 +241,7 @@ def scene(pixels: Pixels, lights: Lights, camera: Camera) -> dict[str, Any]:
         "specular": pixels.specular,
         "shape": pixels.shape,
         "ambient": pixels.ambient,
+        "specular_rgb": pixels.specular_rgb,
         "view_tilt": pixels.view_tilt,
         "light_direction": turn_about_z(lights.direction, -arm_azimuth),
         "light_position_mm": turn_about_z(lights.position_mm, -arm_azimuth),

@@ -277,7 +277,7 @@ def _region(name: str, study: Study, sizes: Sequence[int], allowed: Tolerance) -
 def _options(store: Path, model: str) -> FitOptions:
     """Return the options of the fit in the store, or the default ones."""
     found = fit_attributes(store, model)
-    return FitOptions.of(found) if found else FitOptions()
+    return FitOptions.of(found).settled(found) if found else FitOptions()
 
 
 def _held(

@@ -77,6 +77,14 @@ def fit(
             help="Where no light shows a pixel's highlight, lean on neighbours of the same colour.",
         ),
     ] = FitOptions.share_reflectance,
+    highlight_colour: Annotated[
+        str,
+        typer.Option(
+            "--highlight-colour",
+            metavar="KIND",
+            help="white; own, as gilding's; auto lets lights left out choose, with --residual.",
+        ),
+    ] = FitOptions.highlight_colour,
     residual: Annotated[
         bool,
         typer.Option("--residual", help="Describe what the model leaves over, over light direction."),
@@ -131,6 +139,7 @@ def fit(
             refined=refined,
             threshold_deg=_threshold(threshold),
             highlight=highlight,
+            highlight_colour=highlight_colour,
             residual=residual,
             residual_components=residual_components,
             self_calibrate=self_calibrate,

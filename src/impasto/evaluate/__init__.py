@@ -240,7 +240,7 @@ def _shares(fitted: Fit, stack: Stack, spec: ModelSpec, options: FitOptions) -> 
         return None
     left_out = fitted.attributes["options"]["exclude"]
     seen = [number for number, name in enumerate(stack.lights.names) if name not in left_out]
-    return error_shares(spec, Photographed.of(fitted, stack, seen), options)
+    return error_shares(spec, Photographed.of(fitted, stack, seen), options.settled(fitted.attributes))
 
 
 def _held_out(

@@ -39,9 +39,18 @@ class Misfit:
     criterion: Array
 
 
-def unknowns(model: ModelSpec, channels: int) -> int:
-    """Return how many numbers a model fits to a pixel, its normal's two among them."""
-    return 2 + len(model.shape) + model.lobes + channels * (2 if model.ambient else 1)
+def unknowns(model: ModelSpec, channels: int, *, coloured: bool) -> int:
+    """Return how many numbers a model fits to a pixel, its normal's two among them.
+
+    Parameters
+    ----------
+    model : ModelSpec
+    channels : int
+    coloured : bool
+        Whether highlights have a colour of their own.
+    """
+    colour = channels - 1 if coloured else 0
+    return 2 + len(model.shape) + model.lobes + channels * (2 if model.ambient else 1) + colour
 
 
 def usable_samples(stack: Stack, radiance: NDArray[np.float32]) -> NDArray[np.bool_]:
@@ -77,7 +86,7 @@ def misfit(
     chi2 = np.einsum("lpc,lpc,lpc->p", residual, residual, precision).astype(np.float64)
     count = usable.sum(axis=(0, 2))
     n = np.maximum(count, 1)
-    free = unknowns(pixels.model, radiance.shape[-1])
+    free = unknowns(pixels.model, radiance.shape[-1], coloured=pixels.specular_rgb is not None)
     # Radiance as it would be under lights of equal strength.
     residual /= stack.lights.intensity[:, None].astype(np.float32)
     known /= stack.lights.intensity[:, None].astype(np.float32)

@@ -184,7 +184,7 @@ def error_shares(model: ModelSpec, seen: Photographed, options: FitOptions) -> E
     rms = float(np.sqrt(total / samples))
     after_lights = min(total, float(squares[1][usable].sum()))
     after_shadows = min(after_lights, float(squares[2][kept].sum()))
-    noise = min(after_shadows, _expected_noise(model, seen, kept))
+    noise = min(after_shadows, _expected_noise(model, seen, kept, options))
     if total == 0.0:  # a perfect fit, of which noise is all that is known
         total = noise = after_lights = after_shadows = 1.0
     return ErrorShares(
@@ -244,13 +244,15 @@ def _rest(model: ModelSpec, seen: Photographed, lights: Lights, maps: Maps, opti
     return _encoded(seen.radiance, seen.toe) - _encoded(rendered, seen.toe)
 
 
-def _expected_noise(model: ModelSpec, seen: Photographed, kept: Mask) -> float:
+def _expected_noise(model: ModelSpec, seen: Photographed, kept: Mask, options: FitOptions) -> float:
     """Return the sum of squares on the encoded scale that noise alone leaves after a fit."""
     # The encoding's slope is 1 / 2√(Y + a).
     slope_squared = 0.25 / (np.maximum(np.nan_to_num(seen.radiance), 0.0) + seen.toe)
     expected = np.where(kept, seen.variance * slope_squared, 0.0).sum(axis=(0, 2))
     count = kept.sum(axis=(0, 2))
-    free = 1.0 - unknowns(model, seen.radiance.shape[2]) / np.maximum(count, 1)
+    free = 1.0 - unknowns(
+        model, seen.radiance.shape[2], coloured=options.highlight_colour == "own"
+    ) / np.maximum(count, 1)
     return float((expected * np.maximum(free, 0.0)).sum())
 
 

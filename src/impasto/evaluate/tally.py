@@ -99,6 +99,7 @@ class Tally:
         self._chosen = np.zeros(shape[:2])
         self._known = np.zeros(len(self._names), int)
         self._area = np.zeros(len(self._names), int)
+        self._coloured = [False] * len(self._models)
 
     def add(
         self, radiance: NDArray[np.float32], fitted: Sequence[Pixels], label: NDArray[np.integer]
@@ -120,6 +121,7 @@ class Tally:
             The model that each pixel asks for, counted from 1; 0 where some model has no full fit.
         """
         whole = np.all([pixels.whole for pixels in fitted], axis=0)
+        self._coloured = [pixels.specular_rgb is not None for pixels in fitted]
         self._area += [label.size, *np.bincount(label, minlength=len(self._names))[1:]]
         highlight = is_highlight(fitted[0].select(whole), self._stack)
         misfits = [misfit(p.select(whole), self._stack, radiance[:, whole], highlight) for p in fitted]
@@ -146,7 +148,9 @@ class Tally:
                 compared.append(
                     ModelComparison(
                         model=model,
-                        unknowns=unknowns(parse_model(model), self._stack.shape[3]),
+                        unknowns=unknowns(
+                            parse_model(model), self._stack.shape[3], coloured=self._coloured[index]
+                        ),
                         ratio=ratios.get(model, {}).get(name),
                         rms=self._rms(number, index, [0, 1]),
                         rms_highlight=highlight,

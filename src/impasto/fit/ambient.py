@@ -8,11 +8,11 @@ import numpy as np
 
 from impasto import store as stores
 from impasto.errors import ImpastoError, OptionError, Problem
+from impasto.fit.choice import WORTH_DB
 from impasto.fit.joint import Joint
 from impasto.fit.procedure import Findings, FitOptions, Procedure
 from impasto.fit.remainder import decibels, usual_toe
 from impasto.fit.sample import Sample, deal_lights, sample_pixels
-from impasto.fit.self_calibration import WORTH_DB
 from impasto.models import ModelSpec, with_ambient
 
 _FOLDS = 5

@@ -35,10 +35,13 @@ def in_grey(pixels: Pixels) -> Pixels:
     """Return pixels as a camera of one channel sees them, by luminance."""
     attributes = {**pixels.attributes, "light_rgb": [float(luminance(pixels.light_rgb))]}
     grey = replace(pixels, attributes=attributes, diffuse=_luminance(pixels.diffuse))
+    if pixels.specular_rgb is not None:
+        colour = _luminance(pixels.highlight_rgb) / np.float32(luminance(pixels.light_rgb))
+        grey = replace(grey, specular_rgb=colour)
     return grey if pixels.ambient is None else replace(grey, ambient=_luminance(pixels.ambient))
 
 
-def _luminance(colours: NDArray[np.float32]) -> NDArray[np.float32]:
+def _luminance(colours: NDArray[np.floating]) -> NDArray[np.float32]:
     return luminance(colours)[:, None].astype(np.float32)
 
 
@@ -82,13 +85,14 @@ def radiance_slopes(pixels: Pixels, lights: Lights, camera: Camera) -> tuple[Arr
     intensity = np.broadcast_to(lights.intensity, (len(lights), channels))[:, :, None]
     lobes = pixels.specular.astype(np.float64)[:, None, :, None] * basis[:, :, 1:]
     # What the lobes, and each channel's diffuse term, contribute, and how that follows normal and shape.
-    specular = lobes.sum(axis=2)[:, :, None, :] * pixels.light_rgb[:, None]
+    colour = pixels.highlight_rgb[:, None, :, None]
+    specular = lobes.sum(axis=2)[:, :, None, :] * colour
     matte = diffuse[:, None, :, None] * basis[:, :, :1]
     whole = specular + matte
     each = np.eye(channels)
     columns = [
         whole[..., 1:],
-        lobes[:, :, None, :, 0] * pixels.light_rgb[:, None],
+        lobes[:, :, None, :, 0] * colour,
         matte[..., :1] * each,
     ]
     radiance = whole[..., 0]

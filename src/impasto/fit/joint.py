@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from impasto import store as stores
 from impasto.arm import find_arm
 from impasto.errors import OptionError, Problem, raise_problems
+from impasto.fit.choice import Choice, choose
 from impasto.fit.deviating import deviating, tell_deviating
 from impasto.fit.procedure import Findings, FitOptions
 from impasto.fit.remainder import (
@@ -23,7 +24,7 @@ from impasto.fit.remainder import (
     usual_toe,
 )
 from impasto.fit.sample import Sample, grid_pixels, sample_pixels
-from impasto.fit.self_calibration import Calibration, self_calibrate
+from impasto.fit.self_calibration import Calibration, find_strengths, self_calibrate
 from impasto.fit.shadows import count_shadows, shadow_warnings
 from impasto.fit.sharing import STEP as SHARING_STEP
 from impasto.fit.sharing import Sharing, sharing_problems
@@ -68,12 +69,15 @@ class Joint:
         self._light_rgb = stack.light_rgb
         self._sharing: Sharing | None = None
         self._remainder: Remainder | None = None
-        *maps, status = stores.fit_maps(
-            model.shape_names, lobes=model.lobes, ambient=model.ambient, channels=channels
+        self._channels = channels
+        # Whether it is still to be chosen if highlights have a colour of their own.
+        self._undecided = (
+            options.highlight_colour == "auto"
+            and (options.residual or options.calibrates)
+            and channels > 1
+            and model.lobes > 0
         )
-        shadowed = [stores.shadowed_map()] if options.shadows else []
-        residual = [stores.residual_map(options.residual_components)] if options.residual else []
-        self.maps = (*maps, *shadowed, *residual, status)
+        self._coloured = options.highlight_colour == "own"
         raise_problems(OptionError, self._problems())
 
     def _problems(self) -> list[Problem]:
@@ -113,6 +117,21 @@ class Joint:
         return self._stack.lights.select(self.lights)
 
     @property
+    def maps(self) -> tuple[stores.Map, ...]:
+        """The maps it makes; until `prepare` has chosen, the most that there may be."""
+        model, options = self.model, self._options
+        *maps, status = stores.fit_maps(
+            model.shape_names,
+            lobes=model.lobes,
+            ambient=model.ambient,
+            channels=self._channels,
+            coloured=self._coloured or self._undecided,
+        )
+        shadowed = [stores.shadowed_map()] if options.shadows else []
+        residual = [stores.residual_map(options.residual_components)] if options.residual else []
+        return (*maps, *shadowed, *residual, status)
+
+    @property
     def attributes(self) -> dict[str, Any]:
         """Attributes of the fit."""
         return {
@@ -139,6 +158,10 @@ class Joint:
         if self._options.residual or self._options.calibrates or self._options.shadows:
             sample = _SampledPixels(self, sample_pixels(self._stack, self.lights, show_progress))
             toe = sample.toe
+        if self._undecided:
+            choice = self._choose_highlight_colour(sample)
+            attributes["highlight_colour"] = choice.attributes()
+            notes += (choice.note("highlight colour"),)
         if self._options.calibrates:
             calibration = self_calibrate(
                 sample,
@@ -181,6 +204,20 @@ class Joint:
             fit = self._fitting(part.values, part.row, part.column, self._selected)
             sharing.add(fit(belief=sharing.doubt(fit())), part.row, part.column)
         return sharing
+
+    def _choose_highlight_colour(self, sample: _SampledPixels) -> Choice:
+        """Choose the colour of highlights, with the strengths that white ones find."""
+        lights = self._selected
+        if self._options.calibrates:
+            lights = find_strengths(sample, lights).lights
+
+        def left_out(colour: str) -> float:
+            self._coloured = colour == "own"
+            return sample.left_out_db(lights)
+
+        choice = choose(("white", "own"), left_out)
+        self._coloured, self._undecided = choice.used == "own", False
+        return choice
 
     def conclude(self, read: Callable[..., Iterator[stores.Maps]]) -> Findings:
         """Count what lies in cast shadows, where these were left out; see `Procedure.conclude`."""
@@ -228,7 +265,7 @@ class Joint:
             scale=self._stack.scale,
             offset=self._stack.offset,
             position_mm=position,
-            options=self._options,
+            options=replace(self._options, highlight_colour="own" if self._coloured else "white"),
         )
 
     def pixels(self, maps: stores.Maps, row: NDArray[np.intp], column: NDArray[np.intp]) -> Pixels:

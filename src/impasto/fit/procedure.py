@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Protocol
 
 from numpy.typing import NDArray
@@ -49,6 +49,10 @@ class FitOptions:
     highlight : str
         Whose peak that is: ``pixel``, each pixel's own brightest light, or ``sample``, that of the brightest
         pixel.
+    highlight_colour : str
+        Of the joint procedure: ``white``, that of the light; ``own``, one per pixel, as gilding has it; or
+        ``auto``, which is white unless the procedure looks at a sample first, for the residual or the lights,
+        and lights left out are met closer by ``own``.
     residual : bool
         Whether the joint procedure describes what the model leaves over, over the light's direction.
     residual_components : int
@@ -72,6 +76,7 @@ class FitOptions:
     refined: bool = False
     threshold_deg: float | None = 35.0
     highlight: str = "pixel"
+    highlight_colour: str = "auto"
     residual: bool = False
     residual_components: int = 18
     self_calibrate: bool | None = None
@@ -89,6 +94,7 @@ class FitOptions:
             ("--fresnel", self.fresnel, ("facet", "element")),
             ("--loss", self.loss, ("linear", "cauchy", "huber")),
             ("--highlight", self.highlight, ("pixel", "sample")),
+            ("--highlight-colour", self.highlight_colour, ("auto", "white", "own")),
         ):
             if value not in choices:
                 problems.append(
@@ -157,6 +163,11 @@ class FitOptions:
         options = dict(attributes["options"])
         options["exclude"] = tuple(options["exclude"])
         return cls(index=attributes["index_of_refraction"], fresnel=attributes["fresnel"], **options)
+
+    def settled(self, attributes: Mapping[str, Any]) -> FitOptions:
+        """Return the options with what a fit with these attributes chose by itself."""
+        found = attributes.get("highlight_colour", {})
+        return replace(self, highlight_colour=found.get("used", self.highlight_colour))
 
 
 @dataclass(frozen=True)

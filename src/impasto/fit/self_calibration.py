@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 
 from impasto import store as stores
 from impasto.arm import find_arm
+from impasto.fit.choice import WORTH_DB
 from impasto.fit.light_directions import MIN_LIGHTS, correct_directions
 from impasto.fit.strength import TELLING
 from impasto.geometry import Array, Lights, degrees_between
-
-WORTH_DB = 0.1
-"""How much closer lights left out have to be met for corrected directions to be used."""
 
 # Rounds of fitting the pixels and then the lights; the strengths change by less than 1 % in the last.
 _ROUNDS = 3

@@ -148,6 +148,7 @@ def fit_tile(
         loss_scale=options.loss_scale,
         max_steps=options.max_steps,
         shadows=options.shadows,
+        coloured=options.highlight_colour == "own",
         paper=None if paper is None else (paper.threshold, paper.specular, paper.refined, paper.peak),
         normal=None if normal is None else _per_pixel(normal, pixels),
         belief=None if belief is None else belief.arrays,

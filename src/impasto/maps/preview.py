@@ -17,6 +17,7 @@ _TITLES = {
     "diffuse": "Diffuse magnitude",
     "specular": "Specular magnitude",
     "ambient": "Ambient term",
+    "specular_rgb": "Colour of the highlight",
     "c": "Width of the highlight, c",
     "c2": "Width of the broader lobe, c2",
     "m": "Width of the highlight, m",
@@ -55,7 +56,7 @@ _LOGARITHMIC = {
     *("chi2_reduced", "residual_rms"),
 }
 _SIGNED = {"view_tilt", "correlation"}
-COLOURS = {"diffuse", "ambient"}
+COLOURS = {"diffuse", "ambient", "specular_rgb"}
 
 
 def preview_fit(store: Path, model: str, size: tuple[int, int], longest_px: int) -> Fit:

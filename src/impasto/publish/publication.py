@@ -192,7 +192,7 @@ class Publication:
         fits = [open_fit(self.store, name, level) for level in range(self.levels)]
         there = fits[0].names
         wanted = ["normal", "diffuse", *(["specular"] if spec.lobes else []), *spec.shape_names]
-        wanted += [extra for extra in ("ambient", "view_tilt") if extra in there]
+        wanted += [extra for extra in ("ambient", "specular_rgb", "view_tilt") if extra in there]
         parameters = parameter_columns(fits[0], wanted)
         kept = ("residual_rms", "chi2_reduced", "status")
         quality = parameter_columns(

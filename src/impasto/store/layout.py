@@ -102,7 +102,9 @@ class Map:
         return {"status": 255, RESIDUAL: 2**15}.get(self.name, float("nan"))
 
 
-def fit_maps(shape_names: tuple[str, ...], *, lobes: int, ambient: bool, channels: int) -> tuple[Map, ...]:
+def fit_maps(
+    shape_names: tuple[str, ...], *, lobes: int, ambient: bool, channels: int, coloured: bool = False
+) -> tuple[Map, ...]:
     """Return the maps that a fit of a model has, in the order in which they are written.
 
     Parameters
@@ -115,6 +117,8 @@ def fit_maps(shape_names: tuple[str, ...], *, lobes: int, ambient: bool, channel
         Whether the model has an ambient term.
     channels : int
         Channels of the stack.
+    coloured : bool, optional
+        Whether highlights have a colour of their own, where there are lobes and several channels.
 
     Returns
     -------
@@ -132,9 +136,11 @@ def fit_maps(shape_names: tuple[str, ...], *, lobes: int, ambient: bool, channel
         Map(f"{map.name}_sd", map.axis, map.size, map.units, f"standard deviation of {map.long_name}")
         for map in parameters
     ]
+    colour = Map("specular_rgb", "channel", channels, "1", "colour of the highlight over that of the light")
     return (
         Map("normal", "xyz", 3, "1", "unit normal"),
         *parameters,
+        *([colour] if coloured and lobes and channels > 1 else []),
         Map("normal_sd", None, 1, "rad", "standard deviation of the normal's direction"),
         *deviations,
         Map("chi2_reduced", None, 1, "1", "reduced chi-square"),

@@ -147,7 +147,7 @@ def unpack(packed: NDArray[np.uint16], columns: Sequence[Parameter]) -> Maps:
     return maps
 
 
-_COLOURS = ("diffuse", "ambient", "diffuse_sd", "ambient_sd")
+_COLOURS = ("diffuse", "ambient", "specular_rgb", "diffuse_sd", "ambient_sd")
 
 
 def column_attributes(columns: Sequence[Parameter]) -> list[dict[str, Any]]:

@@ -72,7 +72,7 @@ uniform vec4 glossAxes;        // log of the lower bound and of the ratio, for t
 in vec2 texel;
 out vec4 shown;
 
-struct Pixel { bool missing; vec3 normal; vec3 diffuse; float specular[MAX_LOBES]; float shape[MAX_SHAPE]; vec3 ambient; vec3 view; bool tilted; };
+struct Pixel { bool missing; vec3 normal; vec3 diffuse; vec3 highlight; float specular[MAX_LOBES]; float shape[MAX_SHAPE]; vec3 ambient; vec3 view; bool tilted; };
 
 vec3 unitNormal(uint x, uint y) {
   vec2 xy = vec2(value(x, 0), value(y, 1));
@@ -90,6 +90,7 @@ Pixel pixel(ivec2 at) {
   for (int i = 0; i < MAX_SHAPE; i++) p.shape[i] = 0.5;
 ${lobes.map((i) => `  p.specular[${i}] = matte ? 0.0 : value(code(at, ${at("specular") + i}), ${at("specular") + i});`).join("\n")}
 ${shape}
+  p.highlight = specularColour${at("specular_rgb") < 0 ? "" : ` * ${colour("specular_rgb")}`};
   p.ambient = ${at("ambient") < 0 ? "vec3(0.0)" : colour("ambient")};
   p.tilted = ${tilt >= 0};
   float tilt = ${tilt < 0 ? "0.0" : `matte ? 0.0 : value(code(at, ${tilt}), ${tilt})`};
@@ -132,7 +133,7 @@ vec3 radiance(Pixel p, ivec2 at) {
     Basis b = basis(p.normal, p.shape, illumination(direction, view, optics.index), optics);
     float lobes = 0.0;
     for (int j = 0; j < ${model.lobes}; j++) if (p.specular[j] > 0.0) lobes += p.specular[j] * b.specular[j];
-    vec3 reflected = diffusePart * (p.diffuse * b.diffuse + p.ambient) + specularPart * lobes * specularColour;
+    vec3 reflected = diffusePart * (p.diffuse * b.diffuse + p.ambient) + specularPart * lobes * p.highlight;
     ${addition(mode, components)}
     sum += reflected * falloff * lightColour[i];
   }

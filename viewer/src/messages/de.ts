@@ -33,6 +33,7 @@ export const de: typeof en = {
     normal: "Normale",
     diffuse: "diffuser Anteil",
     specular: "Glanzanteil As",
+    specular_rgb: "Farbe des Glanzlichts",
     c: "c",
     m: "m",
     shininess: "Glanzexponent",

@@ -31,6 +31,7 @@ export const en = {
     normal: "normal",
     diffuse: "diffuse magnitude",
     specular: "specular magnitude As",
+    specular_rgb: "colour of the highlight",
     c: "c",
     m: "m",
     shininess: "shininess",

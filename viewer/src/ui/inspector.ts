@@ -138,11 +138,11 @@ export class Inspector {
     const cases = sweep.map((angle) => ({ normal, view, shape, light: direction(angle, azimuth) }));
     const optics = { index: model.index_of_refraction, element: model.fresnel === "element" };
     const basis = evaluateBasis(this.gl, given, optics, cases);
-    const [diffuse, ambient] = [pick("diffuse"), pick("ambient")];
+    const [diffuse, ambient, tint] = [pick("diffuse"), pick("ambient"), pick("specular_rgb")];
     return basis.map(([d, ...lobes], i) => {
       const highlight = lobes.reduce((sum, lobe, j) => sum + lobe * (specular[j] ?? 0), 0);
       const radiance = model.light_rgb.map(
-        (colour, c) => diffuse[c]! * d! + (ambient[c] ?? 0) + colour * highlight,
+        (colour, c) => diffuse[c]! * d! + (ambient[c] ?? 0) + colour * (tint[c] ?? 1) * highlight,
       );
       return { angle: sweep[i]!, light: cases[i]!.light, radiance };
     });

@@ -27,7 +27,7 @@ __all__ = ["Paper"]
 
 _FOREIGN = dict.fromkeys(
     (
-        *("loss", "loss_scale", "shadows", "share_reflectance"),
+        *("loss", "loss_scale", "shadows", "share_reflectance", "highlight_colour"),
         *("residual", "residual_components", "self_calibrate", "calibrate_directions"),
     ),
     "joint",

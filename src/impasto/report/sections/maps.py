@@ -13,6 +13,7 @@ _MEANINGS = {
     "normal": "the direction in which each place faces: the relief",
     "diffuse": "colour without highlights and shading",
     "specular": "strength of the highlight",
+    "specular_rgb": "over that of the light; white but for metals",
     "ambient": "light that depends on no direction",
     "status": "where the fit can be trusted",
     "residual_rms": "what the model leaves unexplained",
@@ -40,7 +41,7 @@ def map_pictures(subject: Subject, model: str, *, deviations: bool) -> list[Pict
     fit = subject.fits[model]
     small = preview_fit(subject.store, model, fit.shape, PICTURE_PX)
     shape = parse_model(model).shape_names
-    parameters = ["normal", "diffuse", "specular", *shape, "ambient"]
+    parameters = ["normal", "diffuse", "specular", "specular_rgb", *shape, "ambient"]
     names = [f"{name}_sd" for name in parameters] if deviations else [*parameters, "residual_rms", "status"]
     pictures = []
     for name in names:
