@@ -34,8 +34,8 @@ class Choice:
         return f"{what}: lights left out one by one are met by {errors}; {self.used} is used"
 
 
-def choose(ways: Sequence[str], left_out_db: Callable[[str], float]) -> Choice:
-    """Choose the way that meets lights left out best, or the first if none is better by `WORTH_DB`.
+def choose(ways: Sequence[str], left_out_db: Callable[[str], float], worth_db: float = WORTH_DB) -> Choice:
+    """Choose the way that meets lights left out best, or the first if none is better by `worth_db`.
 
     Parameters
     ----------
@@ -43,7 +43,8 @@ def choose(ways: Sequence[str], left_out_db: Callable[[str], float]) -> Choice:
         The usual one first.
     left_out_db : callable
         What each makes of lights left out; more is better.
+    worth_db : float, optional
     """
     errors = {way: left_out_db(way) for way in ways}
     best = max(ways, key=lambda way: errors[way])
-    return Choice(best if errors[best] - errors[ways[0]] > WORTH_DB else ways[0], errors)
+    return Choice(best if errors[best] - errors[ways[0]] > worth_db else ways[0], errors)
