@@ -189,7 +189,7 @@ def test_options_of_the_other_procedure_are_refused_and_do_not_identify_a_fit(bu
     _, joint = fitted(bumpy, LITERAL, procedure="joint")
     own = {"loss", "loss_scale", "shadows", "share_reflectance", "highlight_colour"}
     own |= {"residual", "residual_components"}
-    own |= {"self_calibrate", "calibrate_directions"}
+    own |= {"self_calibrate", "calibrate_directions", "calibrate_distances"}
     assert set(joint["options"]) == {"max_steps", "shadow_level", "exclude", *own}
     _, paper = fitted(bumpy, LITERAL)
     own = {"refined", "threshold_deg", "highlight"}

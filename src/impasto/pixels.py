@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from impasto import _core
 from impasto.errors import OptionError, Problem
 from impasto.geometry import Array, Camera, Lights, position_mm, turn_about_z
+from impasto.light_distance import place_lights
 from impasto.models import ModelSpec, parse_model
 from impasto.residual import ResidualTerm
 from impasto.store import Fit
@@ -219,11 +220,14 @@ def pixels_of_maps(
 def scene(pixels: Pixels, lights: Lights, camera: Camera) -> dict[str, Any]:
     """Return pixels under lights as the core takes them.
 
+    Where the fit found the lights of the photographs near, distant lights stand where it found those.
+
     Raises
     ------
     OptionError
         If a light or the camera is near, and the size of a pixel is not known.
     """
+    lights, camera = place_lights(pixels.attributes, pixels.size, lights, camera)
     normal, position, arm_azimuth = pixels.normal, None, 0.0
     if lights.near or camera.distance_mm is not None:
         position = pixel_positions_mm(pixels, camera)
@@ -259,7 +263,8 @@ def render_pixels(pixels: Pixels, lights: Lights, camera: Camera) -> NDArray[np.
     """Return the relative radiance of pixels under lights.
 
     A pixel whose highlight the photographs do not tell is rendered without one. What the model leaves over is
-    added where the pixels have it.
+    added where the pixels have it. Where the fit found the lights of the photographs near, distant lights
+    stand where it found those.
 
     Parameters
     ----------

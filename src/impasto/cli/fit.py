@@ -110,6 +110,13 @@ def fit(
             help="Whether self-calibration may correct the lights' directions.",
         ),
     ] = FitOptions.calibrate_directions,
+    calibrate_distances: Annotated[
+        bool,
+        typer.Option(
+            "--calibrate-distances/--keep-distances",
+            help="Whether self-calibration may find that distant lights were near.",
+        ),
+    ] = FitOptions.calibrate_distances,
     choose_ambient: Annotated[
         bool,
         typer.Option(
@@ -144,6 +151,7 @@ def fit(
             residual_components=residual_components,
             self_calibrate=self_calibrate,
             calibrate_directions=calibrate_directions,
+            calibrate_distances=calibrate_distances,
         )
         more: dict[str, Any] = {"models": tuple(model)} if model else {}
         summary = impasto.fit(

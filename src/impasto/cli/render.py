@@ -35,7 +35,7 @@ def render(
     ] = None,
     even_light: Annotated[
         bool,
-        typer.Option("--even-light", help="Do not follow the strength of the lights photographed."),
+        typer.Option("--even-light", help="Do not follow strength and distance of the lights photographed."),
     ] = False,
     display: Annotated[
         str, typer.Option("--display", metavar="NAME|FILE", help="srgb, display-p3 or an ICC profile.")

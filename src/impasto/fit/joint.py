@@ -69,7 +69,9 @@ class Joint:
         names = stack.lights.names
         self.lights = [number for number, name in enumerate(names) if name not in options.exclude]
         self._selected = stack.lights.select(self.lights)
-        self._camera = stack.camera
+        # Without a scale, lengths are in pixels.
+        self._mm_per_px = stack.camera.mm_per_px or 1.0
+        self._camera = replace(stack.camera, mm_per_px=self._mm_per_px)
         self._light_rgb = stack.light_rgb
         self._sharing: Sharing | None = None
         self._remainder: Remainder | None = None
@@ -98,8 +100,8 @@ class Joint:
             )
         if self._options.share_reflectance:
             problems += sharing_problems(self.model)
-        near = self._selected.near or self._camera.distance_mm is not None
-        if near and self._camera.mm_per_px is None:
+        near = self._selected.near or self._stack.camera.distance_mm is not None
+        if near and self._stack.camera.mm_per_px is None:
             problems.append(
                 Problem(
                     where=f"{self._stack.store}: stack",
@@ -107,7 +109,6 @@ class Joint:
                     do="Add mm_per_px under [camera] in a TOML light file, and stack again with --overwrite",
                 )
             )
-        self._near = near
         return problems
 
     @property
@@ -210,9 +211,16 @@ class Joint:
         return sharing
 
     def _calibrate(self, sample: _SampledPixels) -> Calibration:
-        """Find strength and direction of the lights."""
+        """Find strength, distance and direction of the lights."""
         few = sample.thinned(_DIRECTION_PIXELS)
-        return self_calibrate(sample, few, self._selected, directions=self._options.calibrate_directions)
+        options = self._options
+        return self_calibrate(
+            sample,
+            few,
+            self._selected,
+            directions=options.calibrate_directions,
+            distances=options.calibrate_distances,
+        )
 
     def _choose_highlight_colour(self, sample: _SampledPixels, lights: Lights) -> Choice:
         """Choose the colour of highlights by how close lights left out are met."""
@@ -256,9 +264,6 @@ class Joint:
         self, values: NDArray[Any], row: NDArray[np.intp], column: NDArray[np.intp], lights: Lights
     ) -> Callable[..., stores.Maps]:
         """Return `fit_tile` with everything but the belief."""
-        position = None
-        if self._near and self._camera.mm_per_px is not None:
-            position = position_mm(row, column, self._height, self._width, self._camera.mm_per_px)
         return partial(
             fit_tile,
             self.model,
@@ -270,9 +275,22 @@ class Joint:
             noise=self._stack.noise,
             scale=self._stack.scale,
             offset=self._stack.offset,
-            position_mm=position,
+            position_mm=self._position(row, column, lights),
             options=replace(self._options, highlight_colour="own" if self._coloured else "white"),
         )
+
+    @property
+    def extent_mm(self) -> float:
+        """Longer side of the picture in mm, or in pixels where nothing is known of its scale."""
+        return max(self._height, self._width) * self._mm_per_px
+
+    def _position(
+        self, row: NDArray[np.intp], column: NDArray[np.intp], lights: Lights
+    ) -> NDArray[np.float32] | None:
+        """Return where pixels lie, as (N, 2), where lights or the camera are near."""
+        if not lights.near and self._camera.distance_mm is None:
+            return None
+        return position_mm(row, column, self._height, self._width, self._mm_per_px)
 
     def pixels(self, maps: stores.Maps, row: NDArray[np.intp], column: NDArray[np.intp]) -> Pixels:
         """Return fitted maps as pixels."""
@@ -318,6 +336,10 @@ class _SampledPixels:
         return self.procedure.clipped(self.measured())
 
     @property
+    def extent_mm(self) -> float:
+        return self.procedure.extent_mm
+
+    @property
     def toe(self) -> float:
         return usual_toe(self.measured())
 
@@ -355,6 +377,7 @@ def _calibration_notes(found: Calibration) -> tuple[str, ...]:
             f"dB: {'the turned ones are used' if found.directions['used'] else 'the stated ones stay'}",
         )
     return (
+        *_distance_notes(found.distances),
         *directions,
         "self-calibration: the strengths of the lights depart from their trend over direction by "
         f"{_rms(departure):.1f} % (rms), {departure.max():.0f} % at most. The attribute "
@@ -366,6 +389,24 @@ def _sharing_notes(found: dict[str, Any]) -> tuple[str, ...]:
     return (
         f"reflectance sharing: {100 * found['shown']:.0f} % of the pixels show how wide their highlight is; "
         "the others lean on those around them that have the same diffuse colour",
+    )
+
+
+def _distance_notes(found: dict[str, Any]) -> tuple[str, ...]:
+    if not found:
+        return ()
+    if "left_out_db" not in found:
+        return ("self-calibration: the lights are too far away for the photographs to tell their distance",)
+    error, own = found["left_out_db"], found["own"]
+    used = {
+        "stated": "distant, as stated",
+        "common": f"{found['common']:.2f} times the picture's longer side away",
+        "own": f"{min(own):.2f} to {max(own):.2f} times the picture's longer side away",
+    }[found["used"]]
+    return (
+        f"self-calibration: lights left out are met to {error['stated']:.2f} dB by distant ones, as stated, "
+        f"to {error['common']:.2f} dB by lights at one distance, and to {error['own']:.2f} dB by lights at a "
+        f"distance each: they are taken to be {used}",
     )
 
 

@@ -62,6 +62,8 @@ class FitOptions:
         describes the residual.
     calibrate_directions : bool
         Whether it may then correct the lights' directions too, where that is borne out by lights left out.
+    calibrate_distances : bool
+        Whether it may then place lights near that are stated as distant, where that is borne out likewise.
     """
 
     index: float = 1.5
@@ -81,6 +83,7 @@ class FitOptions:
     residual_components: int = 18
     self_calibrate: bool | None = None
     calibrate_directions: bool = True
+    calibrate_distances: bool = True
 
     @property
     def calibrates(self) -> bool:

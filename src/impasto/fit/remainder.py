@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -71,8 +71,10 @@ def left_over(
         says only that the radiance was at least so large, what is left over is at least 0, and as much as is
         certain. With `encoder`, the codes of its coefficients instead, (N, K), uint16.
     """
+    # As in the fit: without a scale, lengths are in pixels.
+    camera = replace(stack.camera, mm_per_px=stack.camera.mm_per_px or 1.0)
     found: NDArray[Any] = _core.left_over(
-        scene(pixels, lights, stack.camera),
+        scene(pixels, lights, camera),
         np.ascontiguousarray(values),
         scale=stack.scale,
         offset=stack.offset,

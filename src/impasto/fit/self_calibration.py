@@ -14,7 +14,9 @@ from impasto import store as stores
 from impasto.arm import find_arm
 from impasto.fit.choice import WORTH_DB
 from impasto.fit.light_directions import MIN_LIGHTS, correct_directions
-from impasto.fit.strength import TELLING
+from impasto.fit.light_distances import find_distances
+from impasto.fit.light_process import rounded
+from impasto.fit.strength import TELLING, find_strength
 from impasto.geometry import Array, Lights, degrees_between
 
 # Rounds of fitting the pixels and then the lights; the strengths change by less than 1 % in the last.
@@ -41,6 +43,10 @@ class PixelFit(Protocol):
     def clipped(self) -> NDArray[np.bool_]:
         """Return which samples (L, N, C) are clipped."""
 
+    @property
+    def extent_mm(self) -> float:
+        """Longer side of the picture in mm, or in pixels where nothing is known of its scale."""
+
     def left_out_db(self, lights: Lights) -> float:
         """Return to how many decibels lights left out one by one are met; see `remainder.left_out_db`."""
 
@@ -61,12 +67,15 @@ class Calibration:
         that are stronger there.
     directions : dict
         Whether corrected directions are used, and why; empty where none were sought.
+    distances : dict
+        The same of distances.
     """
 
     lights: Lights
     gain: Array
     trend: Array
     directions: dict[str, Any] = field(default_factory=dict)
+    distances: dict[str, Any] = field(default_factory=dict)
 
     @property
     def departure(self) -> Array:
@@ -79,26 +88,37 @@ class Calibration:
             "gain": np.round(self.gain, 5).tolist(),
             "trend": np.round(self.trend, 5).tolist(),
             **({"directions": self.directions} if self.directions else {}),
+            **({"distances": self.distances} if self.distances else {}),
         }
 
 
-def self_calibrate(pixels: PixelFit, thinned: PixelFit, lights: Lights, *, directions: bool) -> Calibration:
-    """Estimate strength and direction of each light from the photographs.
+def self_calibrate(
+    pixels: PixelFit, thinned: PixelFit, lights: Lights, *, directions: bool, distances: bool
+) -> Calibration:
+    """Estimate strength, distance and direction of each light from the photographs.
 
     Parameters
     ----------
     pixels, thinned : PixelFit
-        A sample of the painting, and fewer pixels of it, which are enough for the directions.
+        A sample of the painting, and fewer pixels of it, which are enough for directions and distances.
     lights : Lights
         As stated.
     directions : bool
         Whether directions may be corrected. They are where lights left out one by one are then met closer by
         `WORTH_DB`, and where the lights are enough to tell them.
+    distances : bool
+        Whether distant lights may be placed near, under the same conditions; a distance for each only where
+        that meets lights left out closer by as much again than one for all.
     """
-    stated = find_strengths(pixels, lights)
-    if not directions or len(lights) < MIN_LIGHTS or find_arm(lights.direction).planar:
+    enough = len(lights) >= MIN_LIGHTS and not find_arm(lights.direction).planar
+    if distances and enough and not lights.near:
+        stated = _place(pixels, thinned, lights)
+    else:
+        stated = find_strengths(pixels, lights)
+    if not directions or not enough:
         return stated
-    corrected = find_strengths(pixels, correct_directions(thinned, lights))
+    placed = replace(stated.lights, intensity=lights.intensity)
+    corrected = find_strengths(pixels, correct_directions(thinned, placed))
     error = [pixels.left_out_db(found.lights) for found in (stated, corrected)]
     turned = degrees_between(lights.direction, corrected.lights.direction)
     found = {
@@ -107,7 +127,44 @@ def self_calibrate(pixels: PixelFit, thinned: PixelFit, lights: Lights, *, direc
         "turned_deg": np.round(turned, 3).tolist(),
         "corrected": np.round(corrected.lights.direction, 6).tolist(),
     }
-    return replace(corrected if found["used"] else stated, directions=found)
+    chosen = corrected if found["used"] else stated
+    return replace(chosen, directions=found, distances=stated.distances)
+
+
+def _place(pixels: PixelFit, thinned: PixelFit, lights: Lights) -> Calibration:
+    """Return the strengths of lights at the distances found, where lights left out bear these out."""
+    used, best = "stated", find_strengths(pixels, lights)
+    near = find_distances(thinned, lights)
+    if not near:
+        return replace(best, distances={"used": used})
+    error = {used: pixels.left_out_db(best.lights)}
+    distance = {}
+    for name, placed in near.items():
+        found = find_strengths(pixels, placed)
+        error[name] = pixels.left_out_db(found.lights)
+        distance[name] = np.linalg.norm(placed.position_mm, axis=1) / pixels.extent_mm
+        if error[name] - error[used] > WORTH_DB:
+            used, best = name, found
+    distances: dict[str, Any] = {
+        "used": used,
+        "left_out_db": error,
+        "common": round(float(distance["common"][0]), 4),
+        "own": np.round(distance["own"], 4).tolist(),
+    }
+    if used != "stated":
+        distances["told"] = _told(lights.direction, distance[used])
+    return replace(best, distances=distances)
+
+
+def _told(direction: Array, distance: Array) -> dict[str, Any]:
+    """Describe the distances (L,) for lights between those that were photographed."""
+    logarithm = np.log(distance)
+    middle = float(np.median(logarithm))
+    told = find_strength(direction, (logarithm - middle)[:, None]) if np.ptp(logarithm) else None
+    return {
+        "distance": float(f"{np.exp(middle):.7g}"),
+        **({"direction": rounded(direction), **told} if told else {}),
+    }
 
 
 def find_strengths(pixels: PixelFit, lights: Lights) -> Calibration:

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from impasto.band_writers import BandWriter
 from impasto.colour.displays import Display
 from impasto.colour.rendition import Rendition, Shown
 from impasto.geometry import Camera, Lights
+from impasto.light_distance import without_distance
 from impasto.models import parse_model
 from impasto.output import prepare_folder
 from impasto.pixels import read_pixels, render_pixels
@@ -136,8 +137,8 @@ def render(
     arm : sequence of float, optional
         Arm angles, degrees.
     even_light : bool, optional
-        Whether lights are as strong as stated, where the fit tells how strong those around them were; else
-        they are so strong.
+        Whether lights are as strong and as far away as stated, where the fit tells how strong and how near
+        those around them were; else they are so.
     out : path
         Folder for the pictures, made if it is not there; pictures of the same names are replaced.
     display : str, path or Display, optional
@@ -185,8 +186,9 @@ def render(
     else:
         wanted = requested_lights(lights, light, arm, channels, stack.camera)
     term = ResidualTerm.of(fit.attributes)
-    if even_light and term is not None:
-        wanted = term.even(wanted)
+    if even_light:
+        fit = replace(fit, attributes=without_distance(fit.attributes))
+        wanted = wanted if term is None else term.even(wanted)
     rendition = requested_rendition(
         stack,
         display=display,

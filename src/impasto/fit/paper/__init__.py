@@ -28,7 +28,8 @@ __all__ = ["Paper"]
 _FOREIGN = dict.fromkeys(
     (
         *("loss", "loss_scale", "shadows", "share_reflectance", "highlight_colour"),
-        *("residual", "residual_components", "self_calibrate", "calibrate_directions"),
+        *("residual", "residual_components", "self_calibrate"),
+        *("calibrate_directions", "calibrate_distances"),
     ),
     "joint",
 )
