@@ -18,6 +18,10 @@ from impasto.errors import CaptureError, OptionError, Problem, raise_problems
 
 _CLIPPED = 1e-3
 _LEAST_PATCHES = 12
+# Mean CIEDE2000 of a fit that is worse than any camera's: the patches are not those of the table.
+_NO_CAMERA = 10.0
+# By what factor a white card's patches may differ, and what share of full scale they read at least.
+_UNEVEN, _DIM = 2.5, 0.02
 
 
 @dataclass(frozen=True)
@@ -135,6 +139,7 @@ def colour(
     rgb, _, _ = table.read(shot.linear(response) - black)
     if even is not None:
         level, _, _ = table.read(even.linear(response) - black)
+        raise_problems(CaptureError, _card_problems(even, level.mean(axis=1)))
         # Divided by its brightness, not by its colour: the light's colour belongs to the camera's numbers.
         rgb = rgb * (level.mean() / level.mean(axis=1, keepdims=True)) / level.mean()
     else:
@@ -142,6 +147,11 @@ def colour(
         rgb = rgb / (rgb[row].mean() / xyz[row, 1])
     fits = {name: fit_colour(rgb, xyz, white_xyz, name) for name in METHODS}
     chosen = method or min(fits, key=lambda name: float(fits[name].left_out.mean()))
+    if (off := float(fits[chosen].difference.mean())) > _NO_CAMERA:
+        what = f"shows patches that are off what is known of them by {off:.0f} CIEDE2000 in the mean, "
+        what += f"expected less than {_NO_CAMERA:.0f}"
+        do = "Check the boxes, which way up the target lies, and that the table is of this target"
+        raise CaptureError(Problem(shot.path.name, what, do))
     content = {
         "chosen": chosen,
         "white_xyz": white_xyz.tolist(),
@@ -164,6 +174,16 @@ def colour(
     ]
     write_calibration(Path(out), "colour", content, subject=subject_of([shot]), made_from=made_from)
     return Colour(Path(out), fits, chosen, white_xyz, table.names)
+
+
+def _card_problems(card: Shot, level: Array) -> list[Problem]:
+    if level.max() < _DIM:
+        what = f"reads {level.max():.1%} of full scale in a patch's place, expected more than {_DIM:.0%}"
+        return [Problem(card.path.name, what, "Photograph a white card in the target's place")]
+    if level.max() > _UNEVEN * level.min():
+        what = f"is no even card: its patches read {level.min():.2g} to {level.max():.2g} of full scale"
+        return [Problem(card.path.name, what, "Photograph a white card in the target's place, evenly lit")]
+    return []
 
 
 def _shot_problems(shot: Shot, card: Shot | None) -> list[Problem]:

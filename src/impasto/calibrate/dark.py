@@ -72,6 +72,7 @@ def dark(
     image = shot.linear(response_table(oecf, [shot])).astype(np.float64)
     raise_problems(CaptureError, _lit(shot, image))
     grid, _ = smooth_surface(image)
+    raise_problems(CaptureError, _leak(shot, grid))
     middle = np.median(image, axis=(0, 1))
     noise = float(np.median(np.abs(image - middle)) / 0.6745) or float(image.std())
     hot = int((np.abs(image - middle) > max(_HOT * noise, _HOT_LEVEL)).any(axis=2).sum())
@@ -123,7 +124,9 @@ def dark_grid(
         raise CaptureError(Problem(path.name, what, "Export both alike"))
     image = capped.linear(table)
     raise_problems(CaptureError, _lit(capped, image))
-    return smooth_surface(image)[0]
+    grid, _ = smooth_surface(image)
+    raise_problems(CaptureError, _leak(capped, grid))
+    return grid
 
 
 def dark_image(
@@ -132,6 +135,21 @@ def dark_image(
     """Return the same over the whole frame, ndarray of shape (H, W, C)."""
     photograph = shot.photograph
     return over_frame(dark_grid(dark, shot, table), photograph.height, photograph.width)
+
+
+def _leak(shot: Shot, grid: NDArray[np.float64]) -> list[Problem]:
+    """Return a problem if a part of the frame is lit."""
+    above = (grid - np.median(grid, axis=(0, 1))).max(axis=2)
+    if above.max() < _LIT:
+        return []
+    row, column = np.unravel_index(above.argmax(), above.shape)
+    photograph = shot.photograph
+    y = row * (photograph.height - 1) / (GRID[0] - 1)
+    x = column * (photograph.width - 1) / (GRID[1] - 1)
+    what = f"is brighter by {above.max():.1%} of full scale about column {x:.0f}, row {y:.0f}: light leaks in"
+    return [
+        Problem(shot.path.name, what, "Cover the viewfinder and the room, and photograph with the cap on")
+    ]
 
 
 def _lit(shot: Shot, image: NDArray[np.floating]) -> list[Problem]:

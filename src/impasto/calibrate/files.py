@@ -18,6 +18,16 @@ SCHEMA = 1
 
 _KEY = "impasto_calibration"
 
+# What each kind holds at least.
+_CONTENT = {
+    "oecf": ("dtype", "response", "linear", "noise"),
+    "dark": ("grid", "level"),
+    "flat": ("grids", "fall_off_taken_out"),
+    "colour": ("chosen", "methods", "white_xyz"),
+    "white": ("radiance", "light_rgb", "reflectance", "normal", "box", "spread", "lights"),
+    "steadiness": ("shift_px", "corrected", "turned_px"),
+}
+
 
 @dataclass(frozen=True)
 class Subject:
@@ -32,6 +42,8 @@ class Subject:
     size : (int, int) or None
         Width and height in pixels.
     channels : int or None
+    dtype : str or None
+        "uint8" for photographs of 8 bits, whose tone curve is the camera's and whose steps are coarse.
     """
 
     camera: str | None = None
@@ -39,6 +51,7 @@ class Subject:
     f_number: float | None = None
     size: tuple[int, int] | None = None
     channels: int | None = None
+    dtype: str | None = None
 
     def differences(self, other: Subject) -> list[str]:
         """Return in words how photographs of `other` are not those this is for."""
@@ -48,6 +61,7 @@ class Subject:
             "f_number": "aperture f/{:g}",
             "size": "{0[0]} x {0[1]} pixels",
             "channels": "{} channels",
+            "dtype": "values of type {}",
         }
         differences = []
         for name, text in words.items():
@@ -98,6 +112,7 @@ def subject_of(
         f_number=common(shots, lambda photograph: photograph.f_number) if f_number else None,
         size=(first.width, first.height) if size else None,
         channels=first.channels,
+        dtype="uint8" if first.dtype.name == "uint8" else None,
     )
 
 
@@ -154,16 +169,21 @@ def read_calibration(path: Path, kind: str) -> Calibration:
         if "size" in subject:
             subject["size"] = tuple(subject["size"])
         subject = Subject(**subject)
+        missing = [name for name in _CONTENT.get(found, ()) if name not in content]
+        later = int(schema) > SCHEMA
     except OSError as error:
         raise CaptureError(
             Problem(str(path), f"cannot be read: {error.strerror}", "Correct its name")
         ) from error
     except (ValueError, KeyError, AttributeError, TypeError) as error:
         raise CaptureError(Problem(str(path), "is not a calibration file of impasto", remake)) from error
-    if schema > SCHEMA:
+    if later:
         what = f"is of version {schema}, and this program reads up to {SCHEMA}"
         raise CaptureError(Problem(str(path), what, "Use a newer impasto, or make the file again"))
     if found != kind:
         what = f"is a calibration of kind {found}, expected {kind}"
+        raise CaptureError(Problem(str(path), what, remake))
+    if missing:
+        what = f"is damaged: it lacks {', '.join(missing)}"
         raise CaptureError(Problem(str(path), what, remake))
     return Calibration(path, kind, subject, content, made_from)

@@ -22,6 +22,8 @@ from impasto.geometry import position_mm
 _CLIPPED = 1e-3
 # Brighter than this share of full scale, a card is well above the noise.
 _DIM = 0.02
+# What a smooth surface may leave of an even card.
+_ROUGH = 0.05
 
 
 @dataclass(frozen=True)
@@ -102,8 +104,8 @@ def flat(
             black = dark_grid(dark, shot, table)
         seen.append(shot.without_pixels)
         surface, residual = smooth_surface(shot.linear(table))
-        surface -= black
-        problems += _card_problems(shot, float(surface.mean()))
+        surface = surface - black
+        problems += _card_problems(shot, surface, float(residual.max()))
         if file is not None:
             surface = surface / _fall_off(shot, file, one)[..., None]
         middle = surface[surface.shape[0] // 2, surface.shape[1] // 2]
@@ -129,7 +131,8 @@ def flat(
     return Flat(Path(out), () if one else tuple(grids), before, after, file is not None, tuple(notes))
 
 
-def _card_problems(shot: Shot, level: float) -> list[Problem]:
+def _card_problems(shot: Shot, surface: Array, residual: float) -> list[Problem]:
+    level = float(surface.mean())
     clipped = float(shot.clipped.mean())
     if clipped > _CLIPPED:
         what = f"is clipped in {clipped:.1%} of its samples"
@@ -139,6 +142,9 @@ def _card_problems(shot: Shot, level: float) -> list[Problem]:
         return [
             Problem(shot.path.name, what, "Expose the card for longer, so that it reads half of full scale")
         ]
+    if residual > _ROUGH or surface.min() <= 0:
+        what = f"is no even card: a smooth surface is off by {residual:.1%}, expected less than {_ROUGH:.0%}"
+        return [Problem(shot.path.name, what, "Fill the frame with an even, matte card, and give its folder")]
     return []
 
 

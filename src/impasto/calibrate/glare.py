@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
+import numpy as np
+
 from impasto.calibrate.dark import dark_image
 from impasto.calibrate.response_file import response_table
 from impasto.calibrate.shots import box_mean, box_problems, read_shot
@@ -15,6 +17,8 @@ from impasto.geometry import Array
 
 # Stray light above this share of the surround's lifts dark paints visibly.
 _MUCH = 0.01
+# What reads more than this share of its surround is no black trap.
+_NO_TRAP = 0.3
 
 
 @dataclass(frozen=True)
@@ -86,5 +90,8 @@ def glare(
     table = response_table(oecf, [shot])
     image = shot.linear(table) - dark_image(dark, shot, table)
     in_trap, beside = box_mean(image, trap), box_mean(image, bright)
+    if not (in_trap < _NO_TRAP * beside).all():
+        what = f"reads {np.max(in_trap):.3g} of full scale, and --bright {np.min(beside):.3g}: no black trap"
+        raise CaptureError(Problem("--trap", what, "Check the two boxes: the first lies in the black trap"))
     share = in_trap / beside - trap_reflectance / bright_reflectance
     return Glare(share, in_trap, beside, bool(share.max() > _MUCH))

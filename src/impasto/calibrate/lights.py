@@ -133,7 +133,7 @@ def lights(
     """
     paths = photographs_in(Path(photos), exclude)
     dropped = tuple(dict.fromkeys(drop))
-    problems = _option_problems(dropped, paths, intensity, card)
+    problems = _option_problems(dropped, paths, intensity, card, mm_per_px, radius_mm, count)
     viewed = _camera(camera, mm_per_px)
     shots: list[Shot] = []
     mean = brightest = np.zeros((1, 1))
@@ -156,6 +156,7 @@ def lights(
     seen = _reflections(paths, windows, kept, found, rays)
     placed, notes = _place([seen[row] for row in kept], rays)
     names = tuple(shots[row].name for row in kept)
+    notes += _cropped(found, size)
     result = Lights(
         names,
         np.array([one.direction for one in placed]),
@@ -193,7 +194,13 @@ def lights(
 
 
 def _option_problems(
-    dropped: Sequence[str], paths: Sequence[Path], intensity: str, card: Sequence[int] | None
+    dropped: Sequence[str],
+    paths: Sequence[Path],
+    intensity: str,
+    card: Sequence[int] | None,
+    mm_per_px: float | None,
+    radius_mm: float | None,
+    count: int | None,
 ) -> list[Problem]:
     problems = [
         Problem(f"--drop {name}", "is none of the photographs", "Correct the name")
@@ -203,6 +210,9 @@ def _option_problems(
     if intensity not in INTENSITIES:
         what = "is not known"
         problems.append(Problem(f"--intensity {intensity}", what, f"Choose {', '.join(INTENSITIES)}"))
+    for option, size in (("--mm-per-px", mm_per_px), ("--radius-mm", radius_mm), ("--count", count)):
+        if size is not None and not size > 0:
+            problems.append(Problem(f"{option} {size:g}", "is not above 0", "Correct it, or leave it out"))
     if (intensity == "card") != (card is not None):
         do = "Give both --intensity card and --card COLUMN,ROW,COLUMN,ROW, or neither"
         problems.append(Problem("--card", "and --intensity card belong together", do))
@@ -347,6 +357,19 @@ def _place(seen: Sequence[list[Reflection | None]], rays: Rays) -> tuple[list[Pl
     if far and len(far) < len(placed):
         notes.append("lights without a position count as infinitely far away")
     return placed, notes
+
+
+def _cropped(spheres: Sequence[Sphere], size: tuple[int, ...]) -> list[str]:
+    """Return a note for each sphere that the frame cuts off."""
+    notes = []
+    for number, sphere in enumerate(spheres, start=1):
+        column, row, radius = sphere.circle
+        if not (radius <= column <= size[1] - 1 - radius and radius <= row <= size[0] - 1 - radius):
+            notes.append(
+                f"sphere {number} is cut off by the frame's edge: lamps that it mirrors there are not seen; "
+                "lay it well within the frame"
+            )
+    return notes
 
 
 def _doubtful(disagreement_deg: Array) -> list[int]:

@@ -22,6 +22,10 @@ from impasto.errors import CaptureError, Problem, raise_problems
 _CLIPPED = 1e-3
 _BLACK = 0.02
 _LEAST_PATCHES = 5
+# Correlation of the logarithms of code and radiance that the patches of a grey scale reach at least.
+_LEAST_CORRELATION = 0.8
+# Share of full scale that the card reads at least.
+_DIM = 0.02
 # Residual of the best straight line below which a camera counts as linear.
 _LINEAR = 0.01
 # Patches whose radiance differs by less than this factor may trade places: tables are not that exact.
@@ -144,6 +148,7 @@ def oecf(
     readings = _readings(parts, target, reflectance, exposure)
     largest = float(np.iinfo(shots[0].codes.dtype).max)
     card_codes = None if even is None else read_parts([part.codes for part in even])[0]
+    raise_problems(CaptureError, _reading_problems(readings, shots, extra, black, largest, card_codes))
     response, radiance = _fit(readings, black, largest, card_codes)
     # The mean of codes is not the code of the mean where noise meets a bent response.
     for _ in range(_UNBENDING):
@@ -259,8 +264,13 @@ def _exposure_problems(shots: Sequence[Shot], exposures_s: Sequence[float]) -> l
     if exposures_s and len(exposures_s) != len(shots):
         what = f"were given for {len(exposures_s)} of {len(shots)} photographs"
         return [Problem("--exposure-s", what, "Give one exposure time per photograph")]
+    problems = [
+        Problem(f"--exposure-s {time:g}", "is not above 0", "Give it in seconds")
+        for time in exposures_s
+        if not time > 0
+    ]
     if exposures_s or len(shots) == 1:
-        return []
+        return problems
     return [
         Problem(shot.path.name, "does not say its exposure time", "Give it for each with --exposure-s")
         for shot in shots
@@ -313,6 +323,36 @@ def _unbent(readings: _Readings, response: Response, parts: Sequence[Sequence[Sh
     table = response.table(parts[0][0].codes.dtype)
     means = np.array([read_parts([part.linear(table) for part in shown])[0] for shown in parts])
     return replace(readings, code=response.codes(means[readings.shot, readings.patch]))
+
+
+def _reading_problems(
+    readings: _Readings,
+    shots: Sequence[Shot],
+    extra: Sequence[Shot],
+    black: Array,
+    largest: float,
+    card: Array | None,
+) -> list[Problem]:
+    """Return what shows that a photograph is not what it is given as."""
+    if (readings.code <= black).any():
+        what = f"reads a code of {black.max():.0f}, and the darkest patch {readings.code.min():.0f}"
+        return [Problem(extra[-1].path.name, what, "Photograph with the cap on, as long as the grey scale")]
+    problems = []
+    if card is not None and (card - black).min() < _DIM * largest:
+        what = f"reads {(card - black).min() / largest:.1%} of full scale in a patch's place"
+        what += f", expected more than {_DIM:.0%}"
+        do = "Photograph an even card in the grey scale's place"
+        problems.append(Problem(extra[0].path.name, what, do))
+    for number, shot in enumerate(shots):
+        of = readings.shot == number
+        if np.count_nonzero(of) < _LEAST_PATCHES:
+            continue
+        rise = np.log(readings.radiance[of]), np.log((readings.code[of] - black).mean(axis=1))
+        if np.ptp(rise[1]) == 0 or np.corrcoef(*rise)[0, 1] < _LEAST_CORRELATION:
+            what = "shows patches that do not become brighter as the table has them"
+            do = "Check the boxes, which way up the grey scale lies, and that the table is of this photograph"
+            problems.append(Problem(shot.path.name, what, do))
+    return problems
 
 
 def _check_rising(readings: _Readings, radiance: Array, target: Patches) -> None:

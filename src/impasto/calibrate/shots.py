@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.capture import Photograph
-from impasto.capture.photographs import find_photographs, read_photograph, without_previews
+from impasto.capture.photographs import READERS, find_photographs, read_photograph, without_previews
 from impasto.colour import linearisation_table
 from impasto.errors import CaptureError, Problem, raise_problems
 
@@ -120,6 +120,9 @@ def read_shot(path: Path) -> Shot:
     """
     if not path.is_file():
         raise CaptureError(Problem(str(path), "is not a file", "Give the name of a photograph"))
+    if path.suffix.lower() not in READERS:
+        what = f"ends in '{path.suffix}', expected a TIFF, EXR, PNG, JPEG or raw file"
+        raise CaptureError(Problem(str(path), what, "Give the name of a photograph"))
     photograph, _ = read_photograph(path)
     codes = np.empty((photograph.height, photograph.width, photograph.channels), photograph.dtype)
     for row, band in photograph.bands(_SLAB_ROWS):

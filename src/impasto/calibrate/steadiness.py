@@ -84,7 +84,8 @@ def steadiness(
     Raises
     ------
     CaptureError
-        If photographs cannot be read or differ in size, or there are fewer than three.
+        If photographs cannot be read or differ in size, there are fewer than three, or most have too little
+        in common.
     OutputError
         If the file cannot be written.
 
@@ -118,6 +119,11 @@ def steadiness(
     shift = found.shift_px[:, ::-1]
     known = np.isfinite(shift[:, 0])
     off = np.where(known, np.hypot(*shift.T), 0.0)
+    if np.count_nonzero(known) < 3 or np.count_nonzero(~known) > len(paths) / 2:
+        lost = ", ".join(np.array(names)[~known][:5].tolist())
+        what = f"holds {np.count_nonzero(~known)} of {len(paths)} photographs with too little in common with "
+        what += f"the others: {lost}"
+        raise CaptureError(Problem(str(photos), what, "Give one series of one painting under all lights"))
     turned = found.turned_px > _MOVED_PX
     correct = known & ~turned & (off > _SIGNIFICANT * np.nan_to_num(found.uncertainty_px))
     corrected = tuple(np.array(names)[correct].tolist())

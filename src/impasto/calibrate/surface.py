@@ -33,7 +33,8 @@ def smooth_surface(image: NDArray[np.floating]) -> tuple[Array, Array]:
     grid : ndarray of shape (rows, columns, C)
         The surface on the nodes of the grid.
     residual : ndarray of shape (C,)
-        Root mean square relative difference of the cells' means from it.
+        Root mean square relative difference of the cells' means from it; infinite for an image that no smooth
+        surface follows, whose mean stands for one.
     """
     from scipy.interpolate import RectBivariateSpline  # long to import, and not used to apply a surface
 
@@ -50,14 +51,19 @@ def smooth_surface(image: NDArray[np.floating]) -> tuple[Array, Array]:
         cells = means[..., channel]
         noise = _noise(cells)
         degree = min(3, len(y) - 1), min(3, len(x) - 1)
-        for _ in range(2):
-            spline = RectBivariateSpline(
-                y, x, cells, kx=degree[0], ky=degree[1], s=cells.size * noise**2,
-                bbox=[0, height - 1, 0, width - 1],
-            )  # fmt: skip
-            off = cells - spline(y, x)
-            # Dust and scratches are the card's and not the light's.
-            cells = np.where(np.abs(off) > _SPECK * max(noise, 1e-12), spline(y, x), cells)
+        try:
+            for _ in range(2):
+                spline = RectBivariateSpline(
+                    y, x, cells, kx=degree[0], ky=degree[1], s=cells.size * noise**2,
+                    bbox=[0, height - 1, 0, width - 1],
+                )  # fmt: skip
+                off = cells - spline(y, x)
+                # Dust and scratches are the card's and not the light's.
+                cells = np.where(np.abs(off) > _SPECK * max(noise, 1e-12), spline(y, x), cells)
+        except ValueError:
+            grid.append(np.full(GRID, cells.mean()))
+            residual.append(np.inf)
+            continue
         grid.append(spline(*nodes(height, width)))
         level = max(float(np.abs(means[..., channel]).mean()), 1e-12)
         residual.append(float(np.sqrt(np.mean((means[..., channel] - spline(y, x)) ** 2))) / level)

@@ -20,6 +20,8 @@ from impasto.geometry import Array, position_mm
 # Lights that reach the reference more slantingly tell little.
 _LEAST_COSINE = 0.2
 _CLIPPED = 1e-3
+# Lights of one strength agree within a few per cent, those of unknown strengths within their differences.
+_LARGEST_SPREAD = 0.5
 
 
 @dataclass(frozen=True)
@@ -136,6 +138,11 @@ def white(
     samples = np.array(found)
     radiance = np.median(samples, axis=0)
     spread = float(np.std(samples.mean(axis=1)) / samples.mean()) if len(samples) > 1 else 0.0
+    if spread > _LARGEST_SPREAD:
+        what = f"show the reference under {len(samples)} lights that differ by {spread:.0%}, "
+        what += f"expected less than {_LARGEST_SPREAD:.0%}"
+        do = "Check the box, --normal, and that the lights are those of these photographs"
+        raise CaptureError(Problem(str(photos), what, do))
     light_rgb = radiance / radiance.mean()
     write_calibration(
         Path(out),

@@ -69,6 +69,10 @@ def read_brackets(capture: Capture, folders: Iterable[str | PathLike[str]]) -> l
         if not folder.is_dir():
             problems.append(Problem(str(folder), "is not a folder", "Give the folder of further exposures"))
             continue
+        if folder.resolve() == capture.photographs[0].path.parent.resolve():
+            do = "Give the folder of further exposures, or leave the option out"
+            problems.append(Problem(str(folder), "holds the photographs themselves", do))
+            continue
         found = {path.stem: path for path in without_previews(find_photographs(folder))[0]}
         times = _times(folder, None)
         for exposures in lights:

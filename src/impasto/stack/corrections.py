@@ -209,7 +209,10 @@ def _differences(calibration: Calibration, capture: Capture) -> list[Problem]:
         size = (photograph.width, photograph.height)
         if photograph.whole_size is not None and _for_whole(calibration, photograph):
             size = photograph.whole_size
-        subject = Subject(photograph.camera, photograph.iso, photograph.f_number, size, photograph.channels)
+        subject = Subject(
+            photograph.camera, photograph.iso, photograph.f_number, size, photograph.channels,
+            photograph.dtype.name,
+        )  # fmt: skip
         for difference in calibration.subject.differences(subject):
             do = "Calibrate with the settings of these photographs, or leave it out"
             problems[difference] = Problem(calibration.path.name, f"is for {difference}", do)
