@@ -15,6 +15,7 @@ from impasto.arm import find_arm
 from impasto.errors import OptionError, Problem, raise_problems
 from impasto.fit.choice import Choice, choose
 from impasto.fit.deviating import deviating, tell_deviating
+from impasto.fit.notes import calibration_notes, residual_notes, sharing_notes
 from impasto.fit.procedure import Findings, FitOptions
 from impasto.fit.remainder import (
     Remainder,
@@ -176,11 +177,11 @@ class Joint:
         if calibration is not None:
             self._selected = calibration.lights
             attributes["self_calibration"] = calibration.attributes()
-            notes += _calibration_notes(calibration)
+            notes += calibration_notes(calibration)
         if self._options.share_reflectance:
             self._sharing = self._find_sharing(show_progress)
             attributes["reflectance_sharing"] = self._sharing.attributes
-            notes += _sharing_notes(self._sharing.attributes)
+            notes += sharing_notes(self._sharing.attributes)
         if self._options.residual:
             self._remainder = find_remainder(
                 sample.left_over(self._selected),
@@ -193,7 +194,7 @@ class Joint:
                 strength := find_strength(calibration.lights.direction, calibration.departure)
             ):
                 attributes["residual"]["strength"] = strength
-            notes += _residual_notes(self._remainder.attributes)
+            notes += residual_notes(self._remainder.attributes)
         if self._options.shadows:
             shadowed, deviating = sample.outliers(self._selected)
             dirt = tell_deviating(deviating, self._selected.names)
@@ -363,62 +364,3 @@ class _SampledPixels:
     def thinned(self, count: int) -> _SampledPixels:
         """Return about `count` of the pixels, or all of fewer."""
         return _SampledPixels(self.procedure, self.sample.thinned(count))
-
-
-def _calibration_notes(found: Calibration) -> tuple[str, ...]:
-    departure = 100 * np.abs(np.exp(found.departure.mean(axis=1)) - 1)
-    directions: tuple[str, ...] = ()
-    if found.directions:
-        error = found.directions["left_out_db"]
-        turned = np.array(found.directions["turned_deg"])
-        directions = (
-            f"self-calibration: directions turned by {_rms(turned):.2f}° (rms), {turned.max():.1f}° at most, "
-            f"meet lights left out to {error['corrected']:.2f} dB, the stated ones to {error['stated']:.2f} "
-            f"dB: {'the turned ones are used' if found.directions['used'] else 'the stated ones stay'}",
-        )
-    return (
-        *_distance_notes(found.distances),
-        *directions,
-        "self-calibration: the strengths of the lights depart from their trend over direction by "
-        f"{_rms(departure):.1f} % (rms), {departure.max():.0f} % at most. The attribute "
-        "self_calibration lists them; --no-self-calibrate takes the lights as stated",
-    )
-
-
-def _sharing_notes(found: dict[str, Any]) -> tuple[str, ...]:
-    return (
-        f"reflectance sharing: {100 * found['shown']:.0f} % of the pixels show how wide their highlight is; "
-        "the others lean on those around them that have the same diffuse colour",
-    )
-
-
-def _distance_notes(found: dict[str, Any]) -> tuple[str, ...]:
-    if not found:
-        return ()
-    if "left_out_db" not in found:
-        return ("self-calibration: the lights are too far away for the photographs to tell their distance",)
-    error, own = found["left_out_db"], found["own"]
-    used = {
-        "stated": "distant, as stated",
-        "common": f"{found['common']:.2f} times the picture's longer side away",
-        "own": f"{min(own):.2f} to {max(own):.2f} times the picture's longer side away",
-    }[found["used"]]
-    return (
-        f"self-calibration: lights left out are met to {error['stated']:.2f} dB by distant ones, as stated, "
-        f"to {error['common']:.2f} dB by lights at one distance, and to {error['own']:.2f} dB by lights at a "
-        f"distance each: they are taken to be {used}",
-    )
-
-
-def _residual_notes(found: dict[str, Any]) -> tuple[str, ...]:
-    error = found["left_out_db"]
-    return (
-        f"residual: lights left out one by one are met to {error['with_residual']:.1f} dB instead of the "
-        f"model's {error['model']:.1f} dB, with length {found['length']:.2g} and noise {found['noise']:.2g}; "
-        f"{found['components']} components keep {100 * found['kept']:.1f} % of it. Outside the hull of the "
-        "lights it fades to nothing",
-    )
-
-
-def _rms(values: NDArray[np.floating]) -> float:
-    return float(np.sqrt(np.square(values).mean()))
