@@ -98,6 +98,10 @@ def _random_maps(spec, maps, unit):
     for parameter in spec.shape:
         draw = between if parameter.lower > 0 else lambda low, high: rng.uniform(low, high, size)
         values[parameter.name] = draw(parameter.lower, parameter.upper)
+    if "exponent" in values:
+        # What a fit may find: a lobe that grows towards grazing angles does so by e²⁰ at most. One that grows
+        # without bounds would be seen where rounding decides whether a light is above a pixel's horizon.
+        values["c"] = np.minimum(values["c"], np.sqrt(1 + 20 / values["exponent"]))
     if spec.ambient:
         values["ambient"] = between(1e-3, 0.1, values["ambient"].shape[2])
     if "specular_rgb" in values:

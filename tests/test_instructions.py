@@ -36,7 +36,7 @@ def test_all_versions_of_the_core_agree(name, tmp_path):
     other_file = tmp_path / "other.npz"
     subprocess.run(
         [sys.executable, "-c", _FIT, name, str(other_file)],
-        env={**os.environ, "IMPASTO_INSTRUCTIONS": name},
+        env={**os.environ, "IMPASTO_INSTRUCTIONS": name, "PYTHONPATH": os.pathsep.join(sys.path)},
         check=True,
     )
     other = np.load(other_file)

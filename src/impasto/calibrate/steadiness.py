@@ -21,6 +21,8 @@ from impasto.geometry import Array
 # Parts of the frame that are compared, so that its middle says as much as its edges, and their size.
 _WINDOW_PX = 512
 _WINDOWS = ((0.5, 0.5), (0.2, 0.2), (0.2, 0.8), (0.8, 0.2), (0.8, 0.8))
+# Photographs of smaller frames have too little detail to be told from those of something else.
+_LEAST_PX = 96
 # A photograph that lies further off than this has moved.
 _MOVED_PX = 0.5
 # One that lies off by more than so many standard deviations can be shifted back.
@@ -119,7 +121,7 @@ def steadiness(
     shift = found.shift_px[:, ::-1]
     known = np.isfinite(shift[:, 0])
     off = np.where(known, np.hypot(*shift.T), 0.0)
-    if np.count_nonzero(known) < 3 or np.count_nonzero(~known) > len(paths) / 2:
+    if min(size) >= _LEAST_PX and np.count_nonzero(known) < max(3, len(paths) / 2):
         lost = ", ".join(np.array(names)[~known][:5].tolist())
         what = f"holds {np.count_nonzero(~known)} of {len(paths)} photographs with too little in common with "
         what += f"the others: {lost}"

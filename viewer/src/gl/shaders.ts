@@ -55,7 +55,9 @@ vec3 encodeSrgb(vec3 light) {
 }
 
 vec3 display(vec3 radiance) {
-  vec3 x = min(radiance * exposure, vec3(1e6));
+  // Products overflow beyond 1e6; all channels are scaled alike, so that the hue stays.
+  vec3 x = min(radiance * exposure, vec3(1e30));
+  x *= min(1.0, 1e6 / max(max(x.r, x.g), max(x.b, 1.0)));
   return toDisplay * x + toDisplayRoots * sqrt(max(x.rgb * x.gbr, vec3(0.0)));
 }
 
