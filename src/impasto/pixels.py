@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from impasto import _core
 from impasto.errors import OptionError, Problem
-from impasto.geometry import Array, Camera, Lights, position_mm, turn_about_z
+from impasto.geometry import Array, Camera, Lights, position_mm, rows_and_columns, turn_about_z
 from impasto.light_distance import place_lights
 from impasto.models import ModelSpec, parse_model
 from impasto.residual import ResidualTerm
@@ -170,8 +170,9 @@ def read_pixels(fit: Fit, rows: slice, columns: slice, *, residual: bool = False
     names += ["residual"] if residual and "residual" in fit.names else []
     maps = fit.read(rows, columns, names)
     height, width = maps["normal"].shape[:2]
-    row = np.repeat(np.arange(rows.start, rows.start + height), width)
-    column = np.tile(np.arange(columns.start, columns.start + width), height)
+    row, column = rows_and_columns(
+        slice(rows.start, rows.start + height), slice(columns.start, columns.start + width)
+    )
     return pixels_of_maps(fit.attributes, fit.shape, row, column, maps)
 
 

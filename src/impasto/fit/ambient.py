@@ -8,7 +8,7 @@ import numpy as np
 
 from impasto import store as stores
 from impasto.errors import ImpastoError, OptionError, Problem
-from impasto.fit.choice import WORTH_DB
+from impasto.fit.choice import choose
 from impasto.fit.joint import Joint
 from impasto.fit.procedure import Findings, FitOptions, Procedure
 from impasto.fit.remainder import decibels, usual_toe
@@ -52,8 +52,8 @@ def choose_ambient(
     -----
     The pixels of a sample are fitted without each fifth of the lights in turn, as they are stated. What a
     model leaves over of these lights is taken on the square-root scale of the residual term, as the mean over
-    the lights of its mean square in decibels. The ambient term is used if that is better by `WORTH_DB`: a
-    term that nothing asks for changes it by less.
+    the lights of its mean square in decibels; `choose` decides. A term that nothing asks for changes it by
+    less than `choice.WORTH_DB`.
     """
     joint = {name: made for name, made in procedures.items() if isinstance(made, Joint)}
     if len(joint) < len(procedures):
@@ -79,13 +79,14 @@ def _choose(make: Callable[[ModelSpec], Joint], model: ModelSpec, sample: Sample
         ambient = make(with_ambient(model, True))
     except ImpastoError:  # too few lights for one more unknown
         return without, Findings()
-    found = {"without": model_left_out_db(without, sample), "with": model_left_out_db(ambient, sample)}
-    used = found["with"] - found["without"] > WORTH_DB
+    ways = {"without": without, "with": ambient}
+    choice = choose(list(ways), lambda way: model_left_out_db(ways[way], sample))
+    found, used = choice.left_out_db, choice.used == "with"
     note = (
         f"ambient term: lights left out are met to {found['with']:.2f} dB with it, to "
         f"{found['without']:.2f} dB without: {'it is fitted' if used else 'it is left away'}"
     )
-    return ambient if used else without, Findings({"ambient_left_out_db": found}, (note,))
+    return ways[choice.used], Findings({"ambient_left_out_db": found}, (note,))
 
 
 def model_left_out_db(procedure: Joint, sample: Sample) -> float:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from impasto import store as stores
 from impasto.arm import find_arm
-from impasto.fit.choice import WORTH_DB
+from impasto.fit.choice import WORTH_DB, choose
 from impasto.fit.light_directions import MIN_LIGHTS, correct_directions
 from impasto.fit.light_distances import find_distances
 from impasto.fit.light_process import rounded
@@ -119,16 +119,16 @@ def self_calibrate(
         return stated
     placed = replace(stated.lights, intensity=lights.intensity)
     corrected = find_strengths(pixels, correct_directions(thinned, placed))
-    error = [pixels.left_out_db(found.lights) for found in (stated, corrected)]
+    ways = {"stated": stated, "corrected": corrected}
+    choice = choose(list(ways), lambda way: pixels.left_out_db(ways[way].lights))
     turned = degrees_between(lights.direction, corrected.lights.direction)
     found = {
-        "used": error[1] - error[0] > WORTH_DB,
-        "left_out_db": {"stated": error[0], "corrected": error[1]},
+        "used": choice.used == "corrected",
+        "left_out_db": choice.left_out_db,
         "turned_deg": np.round(turned, 3).tolist(),
         "corrected": np.round(corrected.lights.direction, 6).tolist(),
     }
-    chosen = corrected if found["used"] else stated
-    return replace(chosen, directions=found, distances=stated.distances)
+    return replace(ways[choice.used], directions=found, distances=stated.distances)
 
 
 def _place(pixels: PixelFit, thinned: PixelFit, lights: Lights) -> Calibration:
