@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +14,12 @@ import impasto
 from impasto.capture.simulate.lamps import dome_lights
 from impasto.colour import encode_srgb
 from impasto.evaluate.held_out import spread_lights
+from impasto.evaluate.shares import Photographed, error_shares
 from impasto.fit import FitOptions
+from impasto.fit.self_calibration import found_lights, self_calibrate
 from impasto.geometry import Camera, Lights
 from impasto.light_distance import place_lights, without_distance
+from impasto.models import parse_model
 from impasto.publish.publication import Publication
 from impasto.render import render_bands
 from impasto.store import open_fit, open_stack
@@ -118,6 +122,29 @@ def test_a_distance_of_each_light_is_found(tmp_path):
     assert abs(bowl_deg(fit, tmp_path / "photos")) < 1.0
 
 
+def test_a_fit_says_where_and_how_strong_it_took_its_lights_to_be(tmp_path, monkeypatch):
+    rng = np.random.default_rng(6)
+    store = stacked(tmp_path, at(1.5 * np.exp(0.2 * rng.standard_normal(60))))
+    direction = zarr.open_array(store / "stack" / "light_direction", mode="r+")
+    turned = direction[...] + np.radians(2.0) * rng.standard_normal(direction.shape)
+    direction[...] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    made = []
+
+    def kept(*arguments, **options):
+        made.append(self_calibrate(*arguments, **options))
+        return made[-1]
+
+    monkeypatch.setattr(sys.modules["impasto.fit.joint"], "self_calibrate", kept)
+    fit = fitted(store, tmp_path, exclude=(), calibrate_directions=True)
+    calibration = fit.attributes["self_calibration"]
+    assert calibration["distances"]["used"] == "own"
+    assert calibration["directions"]["used"]
+    found = found_lights(fit.attributes, open_stack(store).lights, EXTENT_MM)
+    np.testing.assert_allclose(found.direction, made[-1].lights.direction, atol=1e-6)
+    np.testing.assert_allclose(found.position_mm, made[-1].lights.position_mm, rtol=1e-4, atol=1e-3)
+    np.testing.assert_allclose(found.intensity, made[-1].lights.intensity, rtol=1e-4)
+
+
 def test_distances_smooth_over_direction_are_told_to_other_lights(tmp_path):
     # A dome around a place beside the painting.
     position = (2.0 * dome_lights(60).direction + [0.5, 0.3, 0.0]) * EXTENT_MM
@@ -187,6 +214,19 @@ def test_photographs_are_published_with_the_distance_of_their_lights(near_fit):
     lights = Publication(near_fit.store).attributes["photographs"]["lights"]
     distance = np.linalg.norm([light["position_mm"] for light in lights], axis=1)
     np.testing.assert_allclose(distance, distances(near_fit)["common"] * EXTENT_MM, rtol=1e-3)
+
+
+def test_the_shares_of_the_error_know_the_distances(near_fit):
+    stack = open_stack(near_fit.store)
+
+    def shares(fit):
+        seen = Photographed.of(fit, stack, spread_lights(stack.lights, HELD))
+        return error_shares(parse_model(MODEL), seen, FitOptions())
+
+    found = shares(near_fit)
+    distant = shares(replace(near_fit, attributes=without_distance(near_fit.attributes)))
+    assert found.rms < 0.5 * distant.rms
+    assert found.lights < 0.1
 
 
 def test_lights_with_a_position_keep_it():

@@ -7,6 +7,7 @@ point away from the surface. See docs/notation.md.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -175,6 +176,18 @@ class Lights:
             intensity=self.intensity[rows],
             angular_size_deg=self.angular_size_deg[rows],
         )
+
+
+def join_lights(parts: Sequence[Lights]) -> Lights:
+    """Return lights, at least one part, as a whole."""
+    channels = max(part.intensity.shape[1] for part in parts)
+    return Lights(
+        names=tuple(name for part in parts for name in part.names),
+        direction=np.concatenate([part.direction for part in parts]),
+        position_mm=np.concatenate([part.position_mm for part in parts]),
+        intensity=np.concatenate([np.broadcast_to(part.intensity, (len(part), channels)) for part in parts]),
+        angular_size_deg=np.concatenate([part.angular_size_deg for part in parts]),
+    )
 
 
 @dataclass(frozen=True)

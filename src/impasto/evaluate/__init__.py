@@ -220,7 +220,7 @@ def _judge(
                 mean=mean_errors([entry.errors for entry in errors]),
                 without_residual=alone,
                 # Of several rounds no one fit stands for the result.
-                shares=_shares(fitted, stack, spec, options) if record else None,
+                shares=_shares(fitted, stack, spec, options, held) if record else None,
             )
             results.append(result)
             if not record:
@@ -234,13 +234,13 @@ def _judge(
     return _Judged(tuple(results), without_model, not_recorded)
 
 
-def _shares(fitted: Fit, stack: Stack, spec: ModelSpec, options: FitOptions) -> ErrorShares | None:
-    """Return whose the error of a fit is on the photographs it has seen; None by the paper's procedure."""
+def _shares(
+    fitted: Fit, stack: Stack, spec: ModelSpec, options: FitOptions, held: Sequence[int]
+) -> ErrorShares | None:
+    """Return whose the error is on the photographs held out; None by the paper's procedure."""
     if fitted.attributes["procedure"] != "joint":
         return None
-    left_out = fitted.attributes["options"]["exclude"]
-    seen = [number for number, name in enumerate(stack.lights.names) if name not in left_out]
-    return error_shares(spec, Photographed.of(fitted, stack, seen), options.settled(fitted.attributes))
+    return error_shares(spec, Photographed.of(fitted, stack, held), options.settled(fitted.attributes))
 
 
 def _held_out(

@@ -50,7 +50,7 @@ class ModelErrors:
     without_residual : ImageErrors or None
         The mean of the model alone, where the fit describes what it leaves over too.
     shares : ErrorShares or None
-        Whose the error on the fitted photographs is; None by the paper's procedure and over several rounds.
+        Whose the error is, of the model alone; None by the paper's procedure and over several rounds.
     """
 
     model: str

@@ -1,4 +1,4 @@
-"""How much of a fit's error is the lights', the shadows', the noise's and the model's own."""
+"""Where the error on held-out photographs comes from: lights, shadows, noise, their number, the model."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from impasto.evaluate.criteria import unknowns
 from impasto.evaluate.sampling import PaintingSample
 from impasto.fit import FitOptions, fit_tile
 from impasto.fit.remainder import usual_toe
-from impasto.geometry import Array, Camera, Lights, position_mm
+from impasto.fit.self_calibration import found_lights
+from impasto.geometry import Array, Camera, Lights, join_lights, position_mm
+from impasto.light_distance import place_lights
 from impasto.models import ModelSpec
 from impasto.pixels import Pixels, pixels_of_maps, render_pixels
 from impasto.residual import encode
@@ -43,15 +45,19 @@ _SHADOW_SIGMAS = 4.0
 
 @dataclass(frozen=True)
 class ErrorShares:
-    """Whose a fit's squared error is; the four shares add to 1.
+    """Whose the squared error on photographs is that a fit has not seen; the five shares add to 1.
 
     Parameters
     ----------
     model, lights, shadows, noise : float
+    sampling : float
+        Share of what the fitted photographs do not show, such as a highlight that only those held out do.
+    photographs : int
+        How many photographs they are from.
     pixels : int
         How many pixels they are from.
     shadowed : float
-        Share of the samples that lie in a cast shadow.
+        Share of the samples of all photographs that lie in a cast shadow.
     rms : float
         Root of the mean squared error, on the scale of `impasto.residual.encode`.
     """
@@ -60,6 +66,8 @@ class ErrorShares:
     lights: float
     shadows: float
     noise: float
+    sampling: float
+    photographs: int
     pixels: int
     shadowed: float
     rms: float
@@ -73,8 +81,10 @@ class Photographed:
     ----------
     radiance : ndarray of shape (L, P, C), float32
         Relative radiance; NaN where a sample is missing.
+    held_out : ndarray of shape (L,), bool
+        Which photographs the fit has not seen; its error on them is to be divided.
     lights : Lights
-        As stated, one per photograph.
+        As they are known before the photographs held out are looked at, one per photograph.
     camera : Camera
     light_rgb, clip_level : ndarray of shape (C,)
     noise : tuple of float
@@ -86,6 +96,7 @@ class Photographed:
     """
 
     radiance: Values
+    held_out: Mask
     lights: Lights
     camera: Camera
     light_rgb: Array
@@ -100,8 +111,11 @@ class Photographed:
         object.__setattr__(self, "toe", usual_toe(self.radiance))
 
     @classmethod
-    def of(cls, fitted: Fit, stack: Stack, lights: Sequence[int]) -> Photographed:
-        """Return up to 4096 pixels, spread over a painting, under some of its lights.
+    def of(cls, fitted: Fit, stack: Stack, held_out: Sequence[int]) -> Photographed:
+        """Return up to 4096 pixels, spread over a painting, of a fit's photographs and of those held out.
+
+        Lights of the fit are as it found them, in strength, direction and distance; those held out are as a
+        rendering without a residual term has them.
 
         Raises
         ------
@@ -111,10 +125,18 @@ class Photographed:
         sample = PaintingSample(stack, {fitted.attributes["model"]: fitted})
         pixels = sample.pixels(fitted.attributes["model"])
         chosen = np.linspace(0, len(pixels) - 1, min(len(pixels), _PIXELS)).astype(np.intp)
+        left_out = fitted.attributes["options"]["exclude"]
+        seen = [number for number, name in enumerate(stack.lights.names) if name not in left_out]
+        told, camera = place_lights(
+            fitted.attributes, fitted.shape, stack.lights.select(held_out), stack.camera
+        )
+        extent_mm = max(fitted.shape) * (camera.mm_per_px or 1.0)
+        found = found_lights(fitted.attributes, stack.lights.select(seen), extent_mm)
         return cls(
-            radiance=np.ascontiguousarray(sample.radiance[np.asarray(lights)][:, chosen]),
-            lights=stack.lights.select(np.asarray(lights)),
-            camera=stack.camera,
+            radiance=np.ascontiguousarray(sample.radiance[[*seen, *held_out]][:, chosen]),
+            held_out=np.repeat([False, True], [len(seen), len(held_out)]),
+            lights=join_lights([found, told]),
+            camera=camera,
             light_rgb=stack.light_rgb,
             clip_level=stack.clip_level,
             noise=stack.noise,
@@ -139,7 +161,7 @@ class Photographed:
 
 
 def error_shares(model: ModelSpec, seen: Photographed, options: FitOptions) -> ErrorShares:
-    """Divide the squared error of a joint fit between model, lights, shadows and noise.
+    """Divide the squared error of a joint fit on photographs held out between its sources.
 
     Parameters
     ----------
@@ -148,20 +170,23 @@ def error_shares(model: ModelSpec, seen: Photographed, options: FitOptions) -> E
         Pixels spread over the painting, of which there should be some hundred or more.
     options : FitOptions
         Of the fit; what concerns the residual and self-calibration is left away, because the shares are those
-        of what the model alone leaves over under the lights as stated.
+        of what the model alone leaves over under the lights as they are given.
 
     Notes
     -----
-    What is divided is E0, the sum of (f(measured) − f(model))² over all samples that are neither clipped nor
-    missing, f being the square-root scale of `impasto.residual.encode`, on which no highlight outweighs the
-    rest. Each source is taken away in turn and the pixels are fitted again:
+    What is divided is E0, the sum of (f(measured) − f(model))² over all held-out samples that are neither
+    clipped nor missing, f being the square-root scale of `impasto.residual.encode`, on which no highlight
+    outweighs the rest. Each source is taken away in turn, the pixels are fitted again, and the sum is taken
+    over the same photographs:
 
     1. each photograph is given the strength and the direction that bring a robust fit closest to it, less
        what of these is a quadratic function of the direction over all lights, as a material that the model
        does not know brings about: E1. The lights' share is (E0 − E1) / E0;
     2. samples in a cast shadow are left out: E2. The shadows' share is (E1 − E2) / E0;
-    3. the noise that the noise model expects of the samples left, times the share of them that the pixel's
-       own unknowns do not take up, at most E2, is the noise's; what is left is the model's.
+    3. the photographs held out are fitted with the others: E3. The share of what those did not tell, called
+       sampling, is (E2 − E3) / E0;
+    4. the noise that the noise model expects of the samples left, times the share of them that the pixel's
+       own unknowns do not take up, at most E3, is the noise's; what is left is the model's.
 
     A sample is in a cast shadow if the mean of its channels is less than half of what the pixel's diffuse
     part alone gives by a robust fit, and is so by more than four standard deviations of the noise. Attached
@@ -170,30 +195,38 @@ def error_shares(model: ModelSpec, seen: Photographed, options: FitOptions) -> E
     options = replace(options, residual=False, self_calibrate=False)
     found, robust = _find_lights(model, seen, options)
     shadow = _shadowed(model, seen, found, robust, options)
+    unseen = np.broadcast_to(seen.held_out[:, None], shadow.shape)
     fits = [
-        (seen.lights, _fit(model, seen, seen.lights, options)),
-        (found, _fit(model, seen, found, options)),
+        (seen.lights, _fit(model, seen, seen.lights, options, unseen)),
+        (found, _fit(model, seen, found, options, unseen)),
+        (found, _fit(model, seen, found, options, unseen | shadow)),
         (found, _fit(model, seen, found, options, shadow)),
     ]
     rest = [_rest(model, seen, lights, maps, options) for lights, maps in fits]
     usable = seen.usable & np.logical_and.reduce([np.isfinite(part) for part in rest])
-    samples = max(int(usable.sum()), 1)
     kept = usable & ~shadow[..., None]
-    squares = [np.square(part, dtype=np.float64) for part in rest]
-    total = float(squares[0][usable].sum())
-    rms = float(np.sqrt(total / samples))
-    after_lights = min(total, float(squares[1][usable].sum()))
-    after_shadows = min(after_lights, float(squares[2][kept].sum()))
-    noise = min(after_shadows, _expected_noise(model, seen, kept, options))
-    if total == 0.0:  # a perfect fit, of which noise is all that is known
-        total = noise = after_lights = after_shadows = 1.0
+    judged = usable & unseen[..., None]
+    samples = max(int(judged.sum()), 1)
+    counted = (judged, judged, judged & kept, judged & kept)
+    sums = [
+        float(np.square(part[where], dtype=np.float64).sum())
+        for part, where in zip(rest, counted, strict=True)
+    ]
+    rms = float(np.sqrt(sums[0] / samples))
+    # A step that makes the error larger takes nothing away.
+    left = np.minimum.accumulate([*sums, _expected_noise(model, seen, kept, options)])
+    if left[0] == 0.0:  # a perfect fit, of which noise is all that is known
+        left = np.ones_like(left)
+    lights, shadows, sampling, own = (left[:-1] - left[1:]) / left[0]
     return ErrorShares(
-        model=(after_shadows - noise) / total,
-        lights=(total - after_lights) / total,
-        shadows=(after_lights - after_shadows) / total,
-        noise=noise / total,
-        pixels=int(usable.any(axis=(0, 2)).sum()),
-        shadowed=float((usable & shadow[..., None]).sum()) / samples,
+        model=float(own),
+        lights=float(lights),
+        shadows=float(shadows),
+        noise=float(left[-1] / left[0]),
+        sampling=float(sampling),
+        photographs=int(seen.held_out.sum()),
+        pixels=int(judged.any(axis=(0, 2)).sum()),
+        shadowed=float((usable & shadow[..., None]).sum()) / max(int(usable.sum()), 1),
         rms=rms,
     )
 
@@ -245,10 +278,10 @@ def _rest(model: ModelSpec, seen: Photographed, lights: Lights, maps: Maps, opti
 
 
 def _expected_noise(model: ModelSpec, seen: Photographed, kept: Mask, options: FitOptions) -> float:
-    """Return the sum of squares on the encoded scale that noise alone leaves after a fit."""
+    """Return the sum of squares that noise alone leaves of the held-out photographs after a fit of `kept`."""
     # The encoding's slope is 1 / 2√(Y + a).
     slope_squared = 0.25 / (np.maximum(np.nan_to_num(seen.radiance), 0.0) + seen.toe)
-    expected = np.where(kept, seen.variance * slope_squared, 0.0).sum(axis=(0, 2))
+    expected = np.where(kept, seen.variance * slope_squared, 0.0)[seen.held_out].sum(axis=(0, 2))
     count = kept.sum(axis=(0, 2))
     free = 1.0 - unknowns(
         model, seen.radiance.shape[2], coloured=options.highlight_colour == "own"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
@@ -90,6 +91,32 @@ class Calibration:
             **({"directions": self.directions} if self.directions else {}),
             **({"distances": self.distances} if self.distances else {}),
         }
+
+
+def found_lights(attributes: Mapping[str, Any], lights: Lights, extent_mm: float) -> Lights:
+    """Return the lights of a fit as it found them, of what `Calibration.attributes` says.
+
+    Parameters
+    ----------
+    attributes : mapping
+        Of the fit.
+    lights : Lights
+        Of the fit, in order, as stated.
+    extent_mm : float
+        Longer side of the picture in mm, or in pixels where nothing is known of its scale.
+    """
+    found = attributes.get("self_calibration")
+    if not found:
+        return lights
+    distances, directions = found.get("distances", {}), found.get("directions", {})
+    if distances.get("used", "stated") != "stated":
+        distance = np.broadcast_to(distances[distances["used"]], len(lights)) * extent_mm
+        lights = replace(lights, position_mm=lights.direction * distance[:, None])
+    if directions.get("used"):
+        direction = np.array(directions["corrected"])
+        distance = np.linalg.norm(lights.position_mm, axis=1)
+        lights = replace(lights, direction=direction, position_mm=direction * distance[:, None])
+    return replace(lights, intensity=lights.intensity * np.array(found["gain"]) / np.array(found["trend"]))
 
 
 def self_calibrate(

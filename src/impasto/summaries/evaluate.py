@@ -33,10 +33,10 @@ def evaluate_tables(summary: EvaluateSummary) -> Iterator[tuple[str, Row, list[R
     shared = [(model.model, model.shares) for model in summary.models if model.shares is not None]
     if shared:
         yield (
-            "Whose the squared error on the fitted photographs is",
-            ("model", "the model's", "the lights'", "shadows'", "noise's"),
+            "Whose the squared error on the held-out photographs is, of the model alone",
+            ("model", "the model's", "the lights'", "shadows'", "noise's", "too few photographs"),
             [
-                (name, *(percent(share) for share in (found.model, found.lights, found.shadows, found.noise)))
+                (name, *map(percent, (found.model, found.lights, found.shadows, found.noise, found.sampling)))
                 for name, found in shared
             ],
         )

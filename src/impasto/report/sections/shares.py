@@ -1,4 +1,4 @@
-"""Whose the error is: the model's, the lights', shadows' or the noise's."""
+"""Whose the error on held-out photographs is: the model's, the lights', shadows', noise's, their number's."""
 
 from __future__ import annotations
 
@@ -13,9 +13,14 @@ from impasto.store import read_evaluation
 
 _SOURCES = {
     "model": ("the model", "#0072b2", "The paint reflects otherwise than the model can describe."),
-    "lights": ("the lights", "#e69f00", "Lights were stronger, weaker or elsewhere than stated."),
+    "lights": ("the lights", "#e69f00", "Lights were stronger, weaker or elsewhere than the fit took them to be."),
     "shadows": ("cast shadows", "#333333", "Relief stands between the light and the paint."),
     "noise": ("noise", "#999999", "The camera's noise, which no model can or should describe."),
+    "sampling": (
+        "too few photographs",
+        "#56b4e9",
+        "Only photographs that were kept out show what is there, such as a highlight.",
+    ),
 }
 
 
@@ -24,30 +29,31 @@ def section(subject: Subject) -> Section | None:
     shares = {}
     for model in subject.models:
         found = read_evaluation(subject.store, model)
-        if found and found.attributes.get("shares") and is_current(found, subject, model):
-            shares[model] = found.attributes["shares"]
+        kept = found.attributes.get("shares") if found and is_current(found, subject, model) else None
+        if kept and "sampling" in kept:  # else it is of the fitted photographs, from an earlier version
+            shares[model] = kept
     if not shares:
         return None
     page = Section("Where the error comes from")
     counts = sorted({each["pixels"] for each in shares.values()})
     page.text(
-        "The squared error that each model leaves on the photographs that it was fitted to, without a "
-        "residual term and with the lights as stated, divided by its source. Sources are taken away in turn, "
-        "and the pixels are fitted again: first each light is given the strength and direction "
-        "that suit the photographs best, then samples in cast shadows are left out, then the noise that is "
-        f"expected is subtracted. What is left is the model's. From {' or '.join(f'{n:,}' for n in counts)} "
-        "pixels."
+        "The squared error on the photographs kept out of the fit, the same as above, of each model without "
+        "a residual term, divided by its source. Sources are taken away in turn, and the pixels are fitted "
+        "again: first each light is given the strength and direction that suit the photographs best, then "
+        "samples in cast shadows are left out, then the photographs kept out are fitted too, then the noise "
+        "that is expected is subtracted. What is left is the model's. From "
+        f"{' or '.join(f'{n:,}' for n in counts)} pixels."
     )
     words = "; ".join(f"{model}: {_largest(each)}" for model, each in shares.items())
-    alt = f"Bars of the four shares for each model; the table below has the figures. Largest: {words}."
+    alt = f"Bars of the five shares for each model; the table below has the figures. Largest: {words}."
     page.pictures([Picture(drawn(_draw, shares), "Share of the squared error", alt=alt)], columns=1)
     page.table(
         ("source", *shares, "what it means"),
         [
-            (label, *(f"{100 * each[name]:.1f} %" for each in shares.values()), meaning)
+            (label, *(f"{100 * each[name]:.1f}\u00a0%" for each in shares.values()), meaning)
             for name, (label, _, meaning) in _SOURCES.items()
         ],
-        caption="Share of the squared error on the fitted photographs, on a square-root scale",
+        caption="Share of the squared error on the photographs kept out, on a square-root scale",
         words=True,
     )
     return page
