@@ -13,7 +13,7 @@ from impasto.store import read_evaluation
 
 _SOURCES = {
     "model": ("the model", "#0072b2", "The paint reflects otherwise than the model can describe."),
-    "lights": ("the lights", "#e69f00", "Lights were stronger, weaker or elsewhere than the fit took them to be."),
+    "lights": ("the lights", "#e69f00", "Lights were stronger, weaker or elsewhere than the fit has them."),
     "shadows": ("cast shadows", "#333333", "Relief stands between the light and the paint."),
     "noise": ("noise", "#999999", "The camera's noise, which no model can or should describe."),
     "sampling": (
