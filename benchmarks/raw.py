@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from benchmarks.problem import light_directions
-from benchmarks.whole import impasto
+from benchmarks.whole import impasto, wake_memory
 from numpy.typing import NDArray
 
 from impasto.capture.simulate.dng import write_dng
@@ -71,9 +71,13 @@ def measure(folder: Path, height: int, width: int, photographs: int = PHOTOGRAPH
     """Time decoding alone, twice, and `impasto stack` between, on photographs that are written here."""
     photos, store = write_raws(folder, height, width, photographs), folder / "raw.zarr"
     os.sync()  # writing the photographs is not part of the way
+    memory = photographs * height * width * 6 + (1 << 30)  # of the stack's files and the process
+    wake_memory(memory)
     before = _decoding(photos)
     corrections = [f"--{kind}={folder / kind}.json" for kind in ("dark", "flat", "white")]
+    wake_memory(memory)
     stack = impasto("stack", str(photos), str(store), *corrections)
+    wake_memory(memory)
     after = _decoding(photos)
     shutil.rmtree(folder)
     decoding = {name: (before[name] + after[name]) / 2 for name in before}
