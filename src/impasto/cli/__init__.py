@@ -47,7 +47,11 @@ def main() -> None:
     import_module(f"{__name__}.{called if called in COMMANDS else 'commands'}")
     from impasto.cli.app import app
 
-    app()
+    try:
+        app()
+    finally:
+        # Python looks three times for rubbish before it ends, and everything ends with it.
+        gc.freeze()
 
 
 def _spare_the_system() -> None:
