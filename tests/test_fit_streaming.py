@@ -4,6 +4,7 @@ import multiprocessing
 import shutil
 import sys
 import time
+from itertools import count
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from impasto.errors import ImpastoError, OptionError, StoreError
 from impasto.fit import FitOptions, fit, streaming
 from impasto.geometry import dome_direction
 from impasto.stack import stack
+from impasto.store import fits
 from store_files import (
     attributes,
     chunks_in,
@@ -192,42 +194,43 @@ def test_a_fit_made_otherwise_is_replaced_only_on_request(small, first_samples):
     assert contents(small) == before
 
 
-def stop_at_unit(monkeypatch, number, error=KeyboardInterrupt):
-    """Have the fit fail while it writes a unit, after that unit's first maps."""
-    write_map, begun = stores.MapsWriter.write_map, []
+def stop_at_map(monkeypatch, number, error=KeyboardInterrupt):
+    """Have the fit fail when it writes the map of that number, of all blocks and levels."""
+    encode, begun = fits.encode_chunks, count(1)
 
-    def write_some(self, unit, map, values):
-        if map.name == "normal":
-            begun.append(unit)
-        if len(begun) == number and map.name == "status":
+    def encode_some(*arguments):
+        if next(begun) == number:
             raise error
-        write_map(self, unit, map, values)
+        return encode(*arguments)
 
-    monkeypatch.setattr(stores.MapsWriter, "write_map", write_some)
+    monkeypatch.setattr(fits, "encode_chunks", encode_some)
 
 
-@pytest.mark.parametrize("unit", [1, 3, 5, 6])
+# A block has 7 maps; there are 9 of the fit, in 4 units, and 4 and 1 of its levels.
+@pytest.mark.parametrize(("map", "whole"), [(3, 0), (20, 0), (40, 1), (80, 3), (96, 4)])
 def test_an_interrupted_fit_is_continued_to_the_same_bytes(
-    stacked, expected, tmp_path, first_samples, monkeypatch, unit
+    stacked, expected, tmp_path, first_samples, monkeypatch, map, whole
 ):
     path = copy(stacked, tmp_path / "s.zarr")
     with monkeypatch.context() as patch:
-        stop_at_unit(patch, unit)
+        stop_at_map(patch, map)
         with pytest.raises(KeyboardInterrupt):
             fit(path, models=["lambert"])
     with pytest.raises(StoreError, match="not finished"):
         stores.open_fit(path, "lambert")
+    assert not list(path.rglob("*.partial"))
     written = []
     write = stores.MapsWriter.write
 
-    def note(self, unit, values):
-        written.extend([unit] if self.group.startswith("fits") else [])
-        write(self, unit, values)
+    def note(self, tile, values):
+        if self.group.startswith("fits"):
+            written.append((tile.rows.start // 1024, tile.columns.start // 1024))
+        write(self, tile, values)
 
     monkeypatch.setattr(stores.MapsWriter, "write", note)
     (done,) = fit(path, models=["lambert"]).models
     assert done.continued
-    assert len(written) == max(0, 4 - (unit - 1))
+    assert len(set(written)) == 4 - whole
     assert contents(path) == expected
 
 
@@ -236,7 +239,7 @@ def test_an_interrupted_fit_is_not_continued_with_other_options(
 ):
     path = copy(stacked, tmp_path / "s.zarr")
     with monkeypatch.context() as patch:
-        stop_at_unit(patch, 3)
+        stop_at_map(patch, 52)
         with pytest.raises(KeyboardInterrupt):
             fit(path, models=["lambert"], options=FitOptions(max_steps=7))
     (done,) = fit(path, models=["lambert"]).models

@@ -244,10 +244,10 @@ def test_a_fit_that_shares_gives_the_same_bytes_however_it_is_cut_and_stopped(
     monkeypatch.setattr(streaming, "_TILE_BYTES", 9 * 512 * 2 * 32)
     write = store.MapsWriter.write
 
-    def stop(self, unit, values):
-        if self.group.startswith("fits") and unit.column == 1:
+    def stop(self, tile, values):
+        if self.group.startswith("fits") and tile.columns.start == 1024:
             raise KeyboardInterrupt
-        write(self, unit, values)
+        write(self, tile, values)
 
     with monkeypatch.context() as patch:
         patch.setattr(store.MapsWriter, "write", stop)

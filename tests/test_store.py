@@ -418,8 +418,8 @@ def test_units_cover_an_image_once():
     for unit in stores.units(2100, 1025):
         covered[unit.rows, unit.columns] += 1
         inside = np.zeros_like(covered)
-        for rows, columns in unit.tiles(128, 512):
-            inside[rows, columns] += 1
+        for tile in unit.tiles(128, 512):
+            inside[tile.rows, tile.columns] += 1
         assert (inside[unit.rows, unit.columns] == 1).all()
         assert inside.sum() == unit.pixels
     assert (covered == 1).all()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -352,14 +353,18 @@ class _Job:
         shared = {key: self.attributes[key] for key in ("program", "version", "model", "settings_sha256")}
         pyramid = Pyramid(self.store, self.model, maps, self.size, shared)
 
-        def write(unit: stores.Unit, values: stores.Maps) -> None:
-            writer.write(unit, values)
-            pyramid.add(unit, values)
+        def write(block: stores.Tile, values: stores.Maps) -> None:
+            writer.write(block, values)
+            pyramid.add(block, values)
 
         units = pyramid.in_order(writer.unfinished())
         fitted = sum(unit.pixels for unit in units)
         total = self.size[0] * self.size[1]
-        with progress(f"Fitting {self.model}", total, done=total - fitted, show=show_progress) as advance:
+        with (
+            closing(writer),
+            closing(pyramid),
+            progress(f"Fitting {self.model}", total, done=total - fitted, show=show_progress) as advance,
+        ):
             fit_units(self.stack, self.procedure, units, write, advance)
         title = f"Coarser levels of {self.model}"
         with progress(title, pyramid.missing_pixels(), show=show_progress) as advance:

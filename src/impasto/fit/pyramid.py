@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from impasto import store as stores
 
-# Each thread holds a window of four units of one map; more threads would only wait for the disk.
+# Each thread holds a window of four blocks of one map; more threads would only wait for the disk.
 _THREADS = 2
 
 
@@ -96,9 +97,9 @@ def halving(name: str) -> Callable[[NDArray[Any]], NDArray[Any]]:
 
 @dataclass
 class _Partial:
-    """A unit of a coarser level of which a part has been computed."""
+    """A block of a coarser level of which a part has been computed."""
 
-    unit: stores.Unit
+    block: stores.Tile
     maps: stores.Maps
     pixels_missing: int
 
@@ -106,8 +107,8 @@ class _Partial:
 class Pyramid:
     """The coarser levels of a fit.
 
-    Units of each level are made of units of the finer one while those are in memory; `finish` makes from the
-    disk what is missing then.
+    Blocks of each level are made of blocks of the finer one while those are in memory; `finish` makes from
+    the disk what is missing then.
 
     Parameters
     ----------
@@ -146,34 +147,37 @@ class Pyramid:
 
     @staticmethod
     def in_order(units: Sequence[stores.Unit]) -> list[stores.Unit]:
-        """Return units of the fit in the order that `add` needs: those of one coarser unit together."""
+        """Return units of the fit in the order that `add` needs: those of one coarser block together."""
         return sorted(units, key=lambda unit: _interleaved(unit.row, unit.column))
 
-    def add(self, unit: stores.Unit, maps: stores.Maps) -> None:
-        """Take the maps of a unit that was just written.
+    def add(self, block: stores.Tile, maps: stores.Maps) -> None:
+        """Take the maps of a block of the fit that was just written.
 
         Raises
         ------
         StoreError
             If the disk is full.
         """
-        self._add(0, unit, maps)
+        self._add(0, block, maps)
 
-    def _add(self, number: int, unit: stores.Unit, maps: stores.Maps) -> None:
-        """Take the maps of a unit of the level below `self._levels[number]`."""
+    def _add(self, number: int, block: stores.Tile, maps: stores.Maps) -> None:
+        """Take the maps of a block of the level below `self._levels[number]`."""
         if number == len(self._levels):
             return
         level = self._levels[number]
-        parent = stores.unit_at(unit.row // 2, unit.column // 2, level.height, level.width)
+        parent = _block_at(block.rows.start // 2, block.columns.start // 2, level)
         partial = self._partial.get(number)
-        if partial is None or partial.unit != parent:
+        if partial is None or partial.block != parent:
             rows, columns = _below(parent, self._finer_sizes[number])
             partial = self._partial[number] = _Partial(
                 parent,
                 {map.name: np.empty(map.shape(parent.height, parent.width), map.dtype) for map in level.maps},
                 (rows.stop - rows.start) * (columns.stop - columns.start),
             )
-        row, column = unit.rows.start // 2 - parent.rows.start, unit.columns.start // 2 - parent.columns.start
+        row, column = (
+            block.rows.start // 2 - parent.rows.start,
+            block.columns.start // 2 - parent.columns.start,
+        )
 
         def halve_map(name: str) -> None:
             half = halving(name)(maps[name])
@@ -181,11 +185,17 @@ class Pyramid:
 
         with ThreadPoolExecutor(_THREADS, thread_name_prefix="pyramid") as pool:
             list(pool.map(halve_map, maps))
-        partial.pixels_missing -= unit.pixels
+        partial.pixels_missing -= block.pixels
         if partial.pixels_missing == 0:
             del self._partial[number]
             level.write(parent, partial.maps)
             self._add(number + 1, parent, partial.maps)
+
+    def close(self) -> None:
+        """Drop what was not written to its end; `finish` makes it anew."""
+        self._partial.clear()
+        for level in self._levels:
+            level.close()
 
     def finish(self, advance: Callable[[int], None]) -> None:
         """Write what is missing of the levels; every unit of the fit must be there.
@@ -200,7 +210,6 @@ class Pyramid:
         StoreError
             If the disk is full, or a map of the finer level is damaged.
         """
-        self._partial.clear()
         finer = self._finest
         with ThreadPoolExecutor(_THREADS, thread_name_prefix="pyramid") as pool:
             for level in self._levels:
@@ -220,24 +229,31 @@ def _interleaved(row: int, column: int) -> int:
     return sum(((row >> bit & 1) << 2 * bit + 1) | ((column >> bit & 1) << 2 * bit) for bit in range(32))
 
 
-def _below(unit: stores.Unit, size: tuple[int, int]) -> tuple[slice, slice]:
-    """Return the rows and columns of the finer level, of `size`, that a unit is made of."""
+def _block_at(row: int, column: int, level: stores.MapsWriter) -> stores.Tile:
+    """Return the block of a level that holds a pixel."""
+    top, left = row - row % stores.BLOCK, column - column % stores.BLOCK
+    return stores.Tile(
+        slice(top, min(top + stores.BLOCK, level.height)), slice(left, min(left + stores.BLOCK, level.width))
+    )
+
+
+def _below(block: stores.Tile, size: tuple[int, int]) -> tuple[slice, slice]:
+    """Return the rows and columns of the finer level, of `size`, that a block is made of."""
     return (
-        slice(2 * unit.rows.start, min(2 * unit.rows.stop, size[0])),
-        slice(2 * unit.columns.start, min(2 * unit.columns.stop, size[1])),
+        slice(2 * block.rows.start, min(2 * block.rows.stop, size[0])),
+        slice(2 * block.columns.start, min(2 * block.columns.stop, size[1])),
     )
 
 
 def _halve_unit(
     finer: stores.Fit, level: stores.MapsWriter, unit: stores.Unit, pool: ThreadPoolExecutor
 ) -> None:
-    rows, columns = _below(unit, finer.shape)
+    with closing(level):
+        for block in unit.blocks():
+            rows, columns = _below(block, finer.shape)
 
-    def halve_map(map: stores.Map) -> None:
-        values = finer.read(rows, columns, [map.name])[map.name]
-        level.write_map(unit, map, halving(map.name)(values))
+            def halve_map(map: stores.Map, rows: slice = rows, columns: slice = columns) -> NDArray[Any]:
+                return halving(map.name)(finer.read(rows, columns, [map.name])[map.name])
 
-    level.begin(unit)
-    *others, status = level.maps
-    list(pool.map(halve_map, others))
-    halve_map(status)
+            halves = pool.map(halve_map, level.maps)
+            level.write(block, {map.name: half for map, half in zip(level.maps, halves, strict=True)})

@@ -48,7 +48,7 @@ from impasto.store.packing import (
     parameter_columns,
 )
 from impasto.store.published import PUBLISHED_CHUNK, PUBLISHED_SCHEMA, encode_chunk
-from impasto.store.shards import put_shard
+from impasto.store.shards import Shard
 
 _FIT_ATTRIBUTES = (
     "model",
@@ -180,13 +180,12 @@ class Publication:
                     for start, count, total in zip(first, per_shard, array.grid, strict=True)
                 )
             )
-            shard_file = BytesIO()
-            put_shard(
-                shard_file,
-                per_shard,
-                ((place, self.chunk(path, tuple(np.add(first, place).tolist()), SMALL)) for place in places),
-            )
-            return shard_file.getvalue()
+            data = BytesIO()
+            shard_file = Shard(data, per_shard)
+            for place in places:
+                shard_file.put(place, self.chunk(path, tuple(np.add(first, place).tolist()), SMALL))
+            shard_file.finish()
+            return data.getvalue()
 
         counts = (-(-total // count) for total, count in zip(array.grid, per_shard, strict=True))
         for number in product(*(range(count) for count in counts)):

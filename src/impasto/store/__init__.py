@@ -26,6 +26,7 @@ from impasto.store.hierarchy import (
 )
 from impasto.store.layout import (
     ASSUMED_WHITE,
+    BLOCK,
     PYRAMIDS,
     RESIDUAL,
     SCHEMA,
@@ -36,6 +37,7 @@ from impasto.store.layout import (
     STATUS_SEVERITY,
     UNIT,
     Map,
+    Tile,
     Unit,
     fit_maps,
     level_sizes,
@@ -53,6 +55,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ASSUMED_WHITE",
+    "BLOCK",
     "PYRAMIDS",
     "RESIDUAL",
     "SCHEMA",
@@ -72,6 +75,7 @@ __all__ = [
     "Stack",
     "StackHeader",
     "StackWriter",
+    "Tile",
     "Unit",
     "camera",
     "coarser_group",

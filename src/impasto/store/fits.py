@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, ExitStack, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -30,29 +31,35 @@ from impasto.store.hierarchy import (
     write_group,
 )
 from impasto.store.layout import (
+    BLOCK,
     FITS,
     INNER_CHUNK,
     PYRAMIDS,
     UNIT,
     ZSTD,
     Map,
+    Tile,
     Unit,
     status_counts,
+    unit_at,
     units,
 )
-from impasto.store.shards import write_shard
+from impasto.store.shards import Shard, new_shard
 
 Maps = dict[str, NDArray[Any]]
 
-# Maps of a unit that are encoded and written at a time.
+# Maps that are encoded and written at a time.
 _WRITERS = 2
+
+# Chunks in a shard, down and across.
+_GRID = (UNIT // INNER_CHUNK, UNIT // INNER_CHUNK)
 
 
 class MapsWriter:
     """Writes the maps of a fit, or of one of its coarser levels, unit by unit.
 
-    Every map of a unit is one shard, written once and whole; ``status`` is the last, so a unit counts as
-    whole if and only if its status can be read.
+    Every map of a unit is one shard, which appears whole when the unit is complete; ``status`` is the last,
+    so a unit counts as whole if and only if its status can be read.
 
     Parameters
     ----------
@@ -80,6 +87,7 @@ class MapsWriter:
         self.height = height
         self.width = width
         self._attributes = dict(attributes)
+        self._open: _OpenUnit | None = None
         parent = group.rpartition("/")[0]
         while parent and read_group(store / parent) is None:
             write_group(store, parent, {})
@@ -94,14 +102,15 @@ class MapsWriter:
     def _status(self) -> ArrayReader:
         return open_array(self.store, f"{self.group}/status")
 
-    def _shard(self, map: Map, unit: Unit) -> Path:
+    def shard(self, map: Map, unit: Unit) -> Path:
+        """Return the file of one map of a unit."""
         last = () if map.axis is None else ("0",)
         return self.store.joinpath(self.group, map.name, "c", str(unit.row), str(unit.column), *last)
 
     def is_whole(self, unit: Unit) -> bool:
         """Return whether a unit was written to its end."""
         status = next(map for map in self.maps if map.name == "status")
-        if not self._shard(status, unit).is_file():
+        if not self.shard(status, unit).is_file():
             return False
         try:
             self._status.read(unit.rows, unit.columns)
@@ -113,12 +122,14 @@ class MapsWriter:
         """Return the units that still have to be written."""
         return [unit for unit in units(self.height, self.width) if not self.is_whole(unit)]
 
-    def write(self, unit: Unit, values: Mapping[str, NDArray[Any]]) -> None:
-        """Write a unit.
+    def write(self, tile: Tile, values: Mapping[str, NDArray[Any]]) -> None:
+        """Write a block of a unit, or a whole unit; a unit counts once all of its blocks are written.
+
+        The blocks of a unit come one after the other.
 
         Parameters
         ----------
-        unit : Unit
+        tile : Tile
         values : mapping of str to ndarray of shape (rows, columns[, k])
             One entry per map.
 
@@ -127,23 +138,28 @@ class MapsWriter:
         StoreError
             If the disk is full or refuses.
         """
-        self.begin(unit)
-        *others, status = self.maps
-        with ThreadPoolExecutor(_WRITERS, thread_name_prefix="map") as pool:
-            list(pool.map(lambda map: self.write_map(unit, map, values[map.name]), others))
-        self.write_map(unit, status, values[status.name])
+        unit = unit_at(tile.rows.start // UNIT, tile.columns.start // UNIT, self.height, self.width)
+        for block in tile.tiles(BLOCK, BLOCK):
+            inside = block.within(tile)
+            self._write_block(unit, block, {map.name: values[map.name][inside] for map in self.maps})
 
-    def begin(self, unit: Unit) -> None:
-        """Forget what there is of a unit, so that it does not count as whole while it is written anew."""
-        for map in reversed(self.maps):
-            self._shard(map, unit).unlink(missing_ok=True)
+    def _write_block(self, unit: Unit, block: Tile, values: Mapping[str, NDArray[Any]]) -> None:
+        if self._open is None or self._open.unit != unit:
+            self.close()
+            self._open = _OpenUnit(self, unit)
+        try:
+            self._open.write(block, values)
+        except BaseException:
+            self.close()
+            raise
+        if self._open.pixels_missing == 0:
+            self._open = None
 
-    def write_map(self, unit: Unit, map: Map, values: NDArray[Any]) -> None:
-        """Write one map of a unit; the caller sees to it that ``status`` is the last."""
-        with writing(self.store, f"{self.group}/{map.name}"):
-            across = UNIT // INNER_CHUNK
-            chunks = encode_chunks(np.asarray(values, map.dtype), INNER_CHUNK, map.fill_value)
-            write_shard(self._shard(map, unit), (across, across), chunks)
+    def close(self) -> None:
+        """Drop the blocks of a unit that was not written to its end."""
+        if self._open is not None:
+            self._open.discard()
+            self._open = None
 
     def status_counts(self) -> NDArray[np.int64]:
         """Return how many pixels have each status, as an ndarray of shape (256,), int64."""
@@ -156,6 +172,57 @@ class MapsWriter:
         """Declare the group complete, and add attributes that were not known before."""
         self._attributes.update(more)
         write_group(self.store, self.group, {**self._attributes, "complete": True})
+
+
+class _OpenUnit:
+    """A unit that is being written: its shards, under names that do not count."""
+
+    def __init__(self, writer: MapsWriter, unit: Unit) -> None:
+        self.unit = unit
+        self.pixels_missing = unit.pixels
+        self._writer = writer
+        self._files = ExitStack()
+        self._shards: dict[str, Shard] = {}
+
+    def write(self, block: Tile, values: Mapping[str, NDArray[Any]]) -> None:
+        """Write the maps of a block; the last block completes the unit."""
+        if not self._shards:
+            self._begin()
+        top, left = (part.start // INNER_CHUNK for part in block.within(self.unit))
+
+        def put(map: Map) -> None:
+            chunks = encode_chunks(np.asarray(values[map.name], map.dtype), INNER_CHUNK, map.fill_value)
+            with self._writing(map):
+                for (row, column), chunk in chunks:
+                    self._shards[map.name].put((top + row, left + column), chunk)
+
+        with ThreadPoolExecutor(_WRITERS, thread_name_prefix="map") as pool:
+            list(pool.map(put, self._writer.maps))
+        self.pixels_missing -= block.pixels
+        if self.pixels_missing == 0:
+            with self._writing():
+                self._files.close()
+
+    def _begin(self) -> None:
+        # What is opened first is closed last, and forgotten first: status, by which a unit counts.
+        for map in reversed(self._writer.maps):
+            path = self._writer.shard(map, self.unit)
+            with self._writing(map):
+                path.unlink(missing_ok=True)
+                self._shards[map.name] = self._files.enter_context(new_shard(path, _GRID))
+
+    def _writing(self, map: Map | None = None) -> AbstractContextManager[None]:
+        what = self._writer.group if map is None else f"{self._writer.group}/{map.name}"
+        return writing(self._writer.store, what)
+
+    def discard(self) -> None:
+        """Remove what was written."""
+        with suppress(_Discarded), self._files:
+            raise _Discarded
+
+
+class _Discarded(Exception):
+    """Makes shards go that were not written to their end."""
 
 
 def _document(map: Map, height: int, width: int) -> dict[str, Any]:

@@ -2,7 +2,8 @@
 
 A stack is cut into chunks of one light and 512 x 512 pixels, because photographs arrive one by one and fits
 read all lights of a tile; those of a photograph lie in one file. A fit is cut into units of 1024 x 1024
-pixels, each written once and whole, so that an interrupted fit knows what it has.
+pixels, which count as a whole, so that an interrupted fit knows what it has; blocks of 512 x 512 pixels are
+written one after the other.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ EVALUATIONS = "evaluations"
 
 STACK_CHUNK = 512
 UNIT = 1024
+BLOCK = 512
 INNER_CHUNK = 256
 
 # How chunks are compressed. Level -1 writes maps, whose last bits are noise, faster than lz4 does, and
@@ -161,19 +163,15 @@ def residual_map(components: int) -> Map:
 
 
 @dataclass(frozen=True)
-class Unit:
-    """A piece of a fit that is computed and written as a whole.
+class Tile:
+    """A rectangle of pixels.
 
     Parameters
     ----------
-    row, column : int
-        Number of the unit from the top and from the left.
     rows, columns : slice
         The pixels it holds.
     """
 
-    row: int
-    column: int
     rows: slice
     columns: slice
 
@@ -192,14 +190,39 @@ class Unit:
         """Number of pixels."""
         return self.height * self.width
 
-    def tiles(self, height: int, width: int) -> Iterator[tuple[slice, slice]]:
-        """Yield rows and columns of tiles of at most `height` x `width` pixels, row by row."""
+    def tiles(self, height: int, width: int) -> Iterator[Tile]:
+        """Yield tiles of at most `height` x `width` pixels, row by row."""
         for row in range(self.rows.start, self.rows.stop, height):
             for column in range(self.columns.start, self.columns.stop, width):
-                yield (
+                yield Tile(
                     slice(row, min(row + height, self.rows.stop)),
                     slice(column, min(column + width, self.columns.stop)),
                 )
+
+    def within(self, other: Tile) -> tuple[slice, slice]:
+        """Return the rows and columns that it takes in the pixels of another."""
+        return (
+            slice(self.rows.start - other.rows.start, self.rows.stop - other.rows.start),
+            slice(self.columns.start - other.columns.start, self.columns.stop - other.columns.start),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unit(Tile):
+    """A piece of a fit that counts as a whole.
+
+    Parameters
+    ----------
+    row, column : int
+        Number of the unit from the top and from the left.
+    """
+
+    row: int
+    column: int
+
+    def blocks(self) -> Iterator[Tile]:
+        """Yield the pieces in which it is written, in this order."""
+        return self.tiles(BLOCK, BLOCK)
 
 
 def unit_at(row: int, column: int, height: int, width: int) -> Unit:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
@@ -17,20 +18,39 @@ from impasto.store.files import whole_file
 _NONE = 2**64 - 1
 
 Place = tuple[int, ...]
-Chunks = Iterable[tuple[Place, bytes]]
 
 
-def write_shard(path: Path, grid: Sequence[int], chunks: Chunks) -> None:
-    """Write a shard, whole or not at all.
+class Shard:
+    """A shard that is being written.
 
     Parameters
     ----------
-    path : Path
-        The file.
+    file : binary file
+        Where it begins.
     grid : sequence of int
-        How many chunks a shard has along each axis.
-    chunks : iterable
-        Place in the grid and bytes of each chunk that is there; they lie in the file in this order.
+        How many chunks it has along each axis.
+    """
+
+    def __init__(self, file: BinaryIO, grid: Sequence[int]) -> None:
+        self._file = file
+        self._index = np.full((*grid, 2), _NONE, "<u8")
+        self._end = 0
+
+    def put(self, place: Place, chunk: bytes) -> None:
+        """Append a chunk, by its place in the grid."""
+        self._index[place] = self._end, len(chunk)
+        self._end += self._file.write(chunk)
+
+    def finish(self) -> None:
+        """Append the index."""
+        index = self._index.tobytes()
+        self._file.write(index)
+        self._file.write(_checksum(index))
+
+
+@contextmanager
+def new_shard(path: Path, grid: Sequence[int]) -> Iterator[Shard]:
+    """Yield a shard to put chunks in, which takes the place of what is at `path` if the block ends well.
 
     Raises
     ------
@@ -38,18 +58,9 @@ def write_shard(path: Path, grid: Sequence[int], chunks: Chunks) -> None:
         If the disk is full or refuses.
     """
     with whole_file(path) as file:
-        put_shard(file, grid, chunks)
-
-
-def put_shard(file: BinaryIO, grid: Sequence[int], chunks: Chunks) -> None:
-    """Put a shard into an open file; see `write_shard`."""
-    index = np.full((*grid, 2), _NONE, "<u8")
-    end = 0
-    for place, chunk in chunks:
-        index[place] = end, len(chunk)
-        end += file.write(chunk)
-    file.write(index.tobytes())
-    file.write(_checksum(index.tobytes()))
+        shard = Shard(file, grid)
+        yield shard
+        shard.finish()
 
 
 def read_index(file: int, grid: Sequence[int]) -> NDArray[np.uint64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,7 @@ from impasto.store.layout import (
     ZSTD_NOISE,
     stack_fill_value,
 )
-from impasto.store.shards import write_shard
+from impasto.store.shards import new_shard
 
 _RADIANCE = f"{STACK}/radiance"
 
@@ -227,15 +227,12 @@ class StackWriter:
         """
         self._record(light, None, None)
 
-        def chunks() -> Iterator[tuple[tuple[int, ...], bytes]]:
+        path = self.store / _RADIANCE / f"c/{light}/0/0/0"
+        with writing(self.store, _RADIANCE), new_shard(path, self._grid) as shard:
             for first, band in bands:
-                for (row, column), chunk in encode_chunks(
-                    band, STACK_CHUNK, stack_fill_value(band.dtype), self._zstd
-                ):
-                    yield (0, first // STACK_CHUNK + row, column, 0), chunk
-
-        with writing(self.store, _RADIANCE):
-            write_shard(self.store / _RADIANCE / f"c/{light}/0/0/0", self._grid, chunks())
+                chunks = encode_chunks(band, STACK_CHUNK, stack_fill_value(band.dtype), self._zstd)
+                for (row, column), chunk in chunks:
+                    shard.put((0, first // STACK_CHUNK + row, column, 0), chunk)
 
     def finish_light(self, light: int, blake3: str, clipped_samples: int) -> None:
         """Record that a photograph is written whole."""
