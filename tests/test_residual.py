@@ -16,7 +16,7 @@ from impasto.fit.light_process import LightProcess, compress, hull_of
 from impasto.fit.remainder import left_over
 from impasto.fit.strength import find_strength
 from impasto.geometry import Camera, Lights, arm_direction, dome_direction
-from impasto.pixels import Pixels, pixel_positions_mm, render_pixels
+from impasto.pixels import Pixels, near_positions_mm, render_pixels
 from impasto.residual import ZERO, ResidualTerm, encode, kernel
 from impasto.store import open_fit, open_stack
 from store_files import write_capture
@@ -184,7 +184,8 @@ def photographed(count, channels, *, near=False, floats=False):
 def test_left_over_is_the_difference_of_encoded_radiances(count, channels, floats, near):
     stack, values, pixels, under = photographed(count, channels, floats=floats, near=near)
     rest = left_over(stack, values, pixels, under, 0.004)
-    irradiance = under.irradiance(pixel_positions_mm(pixels, stack.camera) if near else None)
+    place = near_positions_mm(pixels.row, pixels.column, pixels.size, under, stack.camera)
+    irradiance = under.irradiance(place)
     measured = values.astype(np.float64) * stack.scale + stack.offset
     model = render_pixels(pixels, under, stack.camera)
     expected = encode(measured / irradiance, 0.004) - encode(model / irradiance, 0.004)

@@ -229,9 +229,8 @@ def scene(pixels: Pixels, lights: Lights, camera: Camera) -> dict[str, Any]:
         If a light or the camera is near, and the size of a pixel is not known.
     """
     lights, camera = place_lights(pixels.attributes, pixels.size, lights, camera)
-    normal, position, arm_azimuth = pixels.normal, None, 0.0
-    if lights.near or camera.distance_mm is not None:
-        position = pixel_positions_mm(pixels, camera)
+    normal, arm_azimuth = pixels.normal, 0.0
+    position = near_positions_mm(pixels.row, pixels.column, pixels.size, lights, camera)
     if pixels.view_tilt is not None:
         arm_azimuth = np.radians(pixels.attributes["sample"]["arm_azimuth_deg"])
         normal = turn_about_z(normal, -arm_azimuth).astype(np.float32)
@@ -292,14 +291,31 @@ def render_pixels(pixels: Pixels, lights: Lights, camera: Camera) -> NDArray[np.
     return radiance
 
 
-def pixel_positions_mm(pixels: Pixels, camera: Camera) -> NDArray[np.float32]:
-    """Return where pixels lie on the painting, shape (P, 2), in mm.
+def near_positions_mm(
+    row: NDArray[np.intp], column: NDArray[np.intp], size: tuple[int, int], lights: Lights, camera: Camera
+) -> NDArray[np.float32] | None:
+    """Return where pixels lie on a painting, if a light or the camera is so near that it matters.
+
+    Parameters
+    ----------
+    row, column : ndarray of shape (P,), int
+    size : tuple of int
+        Height and width of the painting in pixels.
+    lights : Lights
+    camera : Camera
+
+    Returns
+    -------
+    ndarray of shape (P, 2), float32, or None
+        X and Y in mm.
 
     Raises
     ------
     OptionError
-        If the size of a pixel is not known.
+        If it matters, and the size of a pixel is not known.
     """
+    if not lights.near and camera.distance_mm is None:
+        return None
     if camera.mm_per_px is None:
         raise OptionError(
             Problem(
@@ -308,4 +324,4 @@ def pixel_positions_mm(pixels: Pixels, camera: Camera) -> NDArray[np.float32]:
                 do="State mm_per_px under [camera] in the photographs' TOML file and stack them again",
             )
         )
-    return position_mm(pixels.row, pixels.column, *pixels.size, camera.mm_per_px)
+    return position_mm(row, column, *size, camera.mm_per_px)

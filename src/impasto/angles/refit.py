@@ -12,9 +12,8 @@ from impasto.angles.photographed import Photographed
 from impasto.colour import encode_srgb
 from impasto.evaluate.criteria import usable_samples
 from impasto.fit import FitOptions, fit_tile
-from impasto.geometry import position_mm
 from impasto.models import ModelSpec
-from impasto.pixels import Pixels, luminance, pixels_of_maps, render_pixels
+from impasto.pixels import Pixels, luminance, near_positions_mm, pixels_of_maps, render_pixels
 
 # Colour differences take long, and their 95th percentile is known well enough from this many pixels.
 _COLOURS = 2000
@@ -50,9 +49,6 @@ class Refit:
         stack = pixels.stack
         size = stack.shape[1:3]
         chosen, camera = stack.lights.select(np.asarray(lights, np.intp)), pixels.camera
-        position = None
-        if (chosen.near or camera.distance_mm is not None) and camera.mm_per_px is not None:
-            position = position_mm(pixels.row, pixels.column, *size, camera.mm_per_px)
         maps = fit_tile(
             self.model,
             pixels.radiance[np.asarray(lights, np.intp)],
@@ -61,7 +57,7 @@ class Refit:
             light_rgb=stack.light_rgb,
             clip_level=stack.clip_level,
             noise=stack.noise,
-            position_mm=position,
+            position_mm=near_positions_mm(pixels.row, pixels.column, size, chosen, camera),
             options=self.options,
         )
         attributes = {

@@ -13,11 +13,13 @@ from impasto.evaluate.criteria import unknowns
 from impasto.evaluate.sampling import PaintingSample
 from impasto.fit import FitOptions, fit_tile
 from impasto.fit.remainder import usual_toe
+from impasto.fit.robust import robust_fit
 from impasto.fit.self_calibration import found_lights
-from impasto.geometry import Array, Camera, Lights, join_lights, position_mm
+from impasto.fit.trend import find_trend
+from impasto.geometry import Array, Camera, Lights, join_lights
 from impasto.light_distance import place_lights
 from impasto.models import ModelSpec
-from impasto.pixels import Pixels, pixels_of_maps, render_pixels
+from impasto.pixels import Pixels, near_positions_mm, pixels_of_maps, render_pixels
 from impasto.residual import encode
 from impasto.store import Fit, Maps, Stack
 
@@ -29,7 +31,6 @@ _PIXELS = 4096
 
 # Rounds of fitting the pixels and then the lights.
 _ROUNDS = 4
-_REWEIGHTINGS = 5
 _STEP = np.radians(0.5)
 # Standard deviations of a light's log strength and of its two angles, and how many of them it may be off: a
 # model that is wrong must not find its excuse in lights that stood somewhere else.
@@ -234,9 +235,6 @@ def error_shares(model: ModelSpec, seen: Photographed, options: FitOptions) -> E
 def _fit(
     model: ModelSpec, seen: Photographed, lights: Lights, options: FitOptions, left_out: Mask | None = None
 ) -> Maps:
-    position = None
-    if (lights.near or seen.camera.distance_mm is not None) and seen.camera.mm_per_px is not None:
-        position = position_mm(seen.row, seen.column, *seen.size, seen.camera.mm_per_px)
     return fit_tile(
         model,
         seen.radiance,
@@ -245,7 +243,7 @@ def _fit(
         light_rgb=seen.light_rgb,
         clip_level=seen.clip_level,
         noise=seen.noise,
-        position_mm=position,
+        position_mm=near_positions_mm(seen.row, seen.column, seen.size, lights, seen.camera),
         options=options,
         left_out=left_out,
     )
@@ -302,8 +300,9 @@ def _find_lights(model: ModelSpec, seen: Photographed, options: FitOptions) -> t
         for light in range(len(seen.lights)):
             here = usable[light]
             part = slope[:, light][:, here]
-            correction[:, light] = _solve(part, rest[light][here] + correction[:, light] @ part)
-        correction -= np.stack([_trend(seen.lights.direction, row) for row in correction])
+            correction[:, light] = _correction(part, rest[light][here] + correction[:, light] @ part)
+        # In doubt a trend is the material's: lights that are not to blame must not be named.
+        correction -= find_trend(seen.lights.direction, correction.T, told=False).T
         lights = _corrected(seen.lights, correction)
         maps = _fit(model, seen, lights, robust)
     return lights, maps
@@ -325,36 +324,15 @@ def _slopes(model: ModelSpec, seen: Photographed, lights: Lights, maps: Maps, op
     return np.stack([gain, *turned]).astype(np.float32)
 
 
-def _solve(slope: Values, rest: Array) -> Array:
-    """Return one light's correction by iteratively reweighted least squares, shape (3,)."""
-    found = np.zeros(3)
+def _correction(slope: Values, rest: Array) -> Array:
+    """Return by how much to correct one light's log strength and two angles, shape (3,)."""
     if rest.size < 16:
-        return found
-    slope, rest = slope.astype(np.float64), rest.astype(np.float64)
-    for _ in range(_REWEIGHTINGS):
-        left = rest - found @ slope
-        scale = 2.0 * 1.4826 * np.median(np.abs(left)) + 1e-9
-        weighted = slope / (1.0 + np.square(left / scale))
-        prior = np.diag((scale / 2.0) ** 2 / np.square(_PRIOR_SD)) * max(rest.size / _INDEPENDENT, 1.0)
-        found = np.linalg.solve(weighted @ slope.T + prior, weighted @ rest)
+        return np.zeros(3)
+    precision = max(rest.size / _INDEPENDENT, 1.0) / np.square(_PRIOR_SD)
+    terms, rest = slope.T.astype(np.float64), rest.astype(np.float64)
+    found = robust_fit(terms, rest, np.ones_like(rest), precision, np.zeros(3))
     limit = _MOST_SDS * np.array(_PRIOR_SD)
     return np.clip(found, -limit, limit)
-
-
-def _trend(direction: Array, values: Array) -> Array:
-    """Return the quadratic of direction that robustly describes values (L,); of few, their median."""
-    x, y, _ = direction.T
-    terms = np.stack([np.ones_like(x), x, y, x * x, y * y, x * y], axis=1)
-    if len(direction) < 3 * terms.shape[1]:
-        return np.full_like(values, np.median(values))
-    weight = np.ones_like(values)
-    fitted = values
-    for _ in range(10):
-        weighted = terms * weight[:, None]
-        fitted = terms @ np.linalg.lstsq(weighted.T @ terms, weighted.T @ values, rcond=None)[0]
-        rest = values - fitted
-        weight = 1.0 / (1.0 + np.square(rest / (2.0 * 1.4826 * np.median(np.abs(rest)) + 1e-9)))
-    return fitted
 
 
 def _corrected(lights: Lights, correction: Array) -> Lights:

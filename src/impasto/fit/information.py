@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from impasto import _core
 from impasto.geometry import Array, Camera, Lights
-from impasto.pixels import Pixels, luminance, pixel_positions_mm
+from impasto.pixels import Pixels, luminance, near_positions_mm
 
 
 def parameter_names(pixels: Pixels) -> tuple[str, ...]:
@@ -67,7 +67,6 @@ def radiance_slopes(pixels: Pixels, lights: Lights, camera: Camera) -> tuple[Arr
     OptionError
         If a light or the camera is near, and the size of a pixel is not known.
     """
-    near = lights.near or camera.distance_mm is not None
     basis = _core.basis_slopes(
         pixels.model.name,
         pixels.normal.astype(np.float64),
@@ -76,7 +75,7 @@ def radiance_slopes(pixels: Pixels, lights: Lights, camera: Camera) -> tuple[Arr
         light_position_mm=lights.position_mm,
         view_direction=camera.view_direction,
         camera_distance_mm=camera.distance_mm,
-        position_mm=pixel_positions_mm(pixels, camera) if near else None,
+        position_mm=near_positions_mm(pixels.row, pixels.column, pixels.size, lights, camera),
         index=pixels.attributes["index_of_refraction"],
         fresnel=pixels.attributes["fresnel"],
     )

@@ -31,9 +31,9 @@ from impasto.fit.sharing import STEP as SHARING_STEP
 from impasto.fit.sharing import Sharing, sharing_problems
 from impasto.fit.strength import find_strength
 from impasto.fit.tile import fit_tile
-from impasto.geometry import Lights, position_mm, rows_and_columns
+from impasto.geometry import Lights, rows_and_columns
 from impasto.models import ModelSpec
-from impasto.pixels import Pixels, pixels_of_maps, render_pixels
+from impasto.pixels import Pixels, near_positions_mm, pixels_of_maps, render_pixels
 
 # Enough, because what limits the directions is the model's error, not the noise.
 _DIRECTION_PIXELS = 2000
@@ -66,7 +66,8 @@ class Joint:
         self._stack = stack
         self.model = model
         self._options = options
-        _, self._height, self._width, channels = stack.shape
+        _, height, width, channels = stack.shape
+        self._size = (height, width)
         names = stack.lights.names
         self.lights = [number for number, name in enumerate(names) if name not in options.exclude]
         self._selected = stack.lights.select(self.lights)
@@ -276,26 +277,18 @@ class Joint:
             noise=self._stack.noise,
             scale=self._stack.scale,
             offset=self._stack.offset,
-            position_mm=self._position(row, column, lights),
+            position_mm=near_positions_mm(row, column, self._size, lights, self._camera),
             options=replace(self._options, highlight_colour="own" if self._coloured else "white"),
         )
 
     @property
     def extent_mm(self) -> float:
         """Longer side of the picture in mm, or in pixels where nothing is known of its scale."""
-        return max(self._height, self._width) * self._mm_per_px
-
-    def _position(
-        self, row: NDArray[np.intp], column: NDArray[np.intp], lights: Lights
-    ) -> NDArray[np.float32] | None:
-        """Return where pixels lie, as (N, 2), where lights or the camera are near."""
-        if not lights.near and self._camera.distance_mm is None:
-            return None
-        return position_mm(row, column, self._height, self._width, self._mm_per_px)
+        return max(self._size) * self._mm_per_px
 
     def pixels(self, maps: stores.Maps, row: NDArray[np.intp], column: NDArray[np.intp]) -> Pixels:
         """Return fitted maps as pixels."""
-        return pixels_of_maps(self.attributes, (self._height, self._width), row, column, maps)
+        return pixels_of_maps(self.attributes, self._size, row, column, maps)
 
     def measured(self, values: NDArray[Any]) -> NDArray[np.float32]:
         """Return the radiance of stored values."""

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from impasto.fit.light_evidence import least_radiance, log_ratio
+from impasto.fit.robust import robust_fit
 from impasto.geometry import Array, Lights
 
 if TYPE_CHECKING:
@@ -33,10 +35,6 @@ _STEP = 0.05
 # pixels tell as much as one would of which the model knows everything.
 _SPREAD = 0.3
 _ALIKE = 30.0
-
-# As for the strengths: what a model gets wrong in a highlight is not the light's.
-_HIGHLIGHT = 0.05
-_REWEIGHTINGS = 10
 
 
 @dataclass(frozen=True)
@@ -114,12 +112,8 @@ def _compare(pixels: PixelFit, lights: Lights) -> _Compared:
         pixels.radiance(maps, lights, highlights=highlights).mean(axis=2, dtype=np.float64)
         for highlights in (True, False)
     )
-    floor = 0.05 * float(np.nanmean(measured))
-    usable = (measured > floor) & (radiance > floor) & ~pixels.clipped().any(axis=2)
-    measured, radiance, matte = (np.where(usable, values, 1.0) for values in (measured, radiance, matte))
-    known = 1.0 / (1.0 + np.square((1.0 - matte / radiance) / _HIGHLIGHT))
-    weight = np.where(usable, np.minimum(measured, radiance) * known, 0.0)
-    return _Compared(maps, np.log(measured / radiance), weight)
+    clipped = np.asarray(pixels.clipped().any(axis=2))
+    return _Compared(maps, *log_ratio(measured, radiance, matte, clipped, least_radiance(measured)))
 
 
 def _misfit(compared: _Compared) -> float:
@@ -181,15 +175,5 @@ def _robust_step(ratio: Array, slope: Array, weight: Array, departure: float) ->
     Its strength is free; the prior draws the distance towards the common one, from which it departs so far.
     """
     terms = np.stack([np.ones_like(slope), slope], axis=1)
-    own = weight = weight / weight.mean()
-    found = np.zeros(2)
-    for _ in range(_REWEIGHTINGS):
-        weighted = terms * own[:, None]
-        rest = ratio - terms @ found
-        scale = 2.0 * 1.4826 * np.median(np.abs(rest)) + 1e-9
-        prior = np.array([0.0, _ALIKE * (scale / 2.0) ** 2 / _SPREAD**2])
-        found = np.linalg.solve(
-            terms.T @ weighted + np.diag(prior), weighted.T @ ratio - prior * [0.0, departure]
-        )
-        own = weight / (1.0 + np.square((ratio - terms @ found) / scale))
-    return float(found[1])
+    precision, mean = np.array([0.0, _ALIKE / _SPREAD**2]), np.array([0.0, -departure])
+    return float(robust_fit(terms, ratio, weight / weight.mean(), precision, mean)[1])

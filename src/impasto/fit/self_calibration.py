@@ -16,15 +16,14 @@ from impasto.arm import find_arm
 from impasto.fit.choice import WORTH_DB, choose
 from impasto.fit.light_directions import MIN_LIGHTS, correct_directions
 from impasto.fit.light_distances import find_distances
+from impasto.fit.light_evidence import least_radiance, log_ratio
 from impasto.fit.light_process import rounded
-from impasto.fit.strength import TELLING, find_strength
+from impasto.fit.strength import find_strength
+from impasto.fit.trend import find_trend
 from impasto.geometry import Array, Lights, degrees_between
 
 # Rounds of fitting the pixels and then the lights; the strengths change by less than 1 % in the last.
 _ROUNDS = 3
-
-# A sample with this share of highlight counts half: what a model gets wrong there is not the light's.
-_HIGHLIGHT = 0.05
 
 Values = NDArray[np.float32]
 
@@ -206,42 +205,37 @@ def find_strengths(pixels: PixelFit, lights: Lights) -> Calibration:
 
     Notes
     -----
-    A strength is the weighted median, over the pixels, of measured over modelled radiance; the weight is the
-    smaller of both, which keeps highlights that the model misses and shadows that it does not know from
-    counting, and less where the model has a highlight.
+    A strength is the weighted median, over the pixels, of measured over modelled radiance; see `log_ratio`.
     """
     measured, clipped = pixels.measured(), pixels.clipped()
     stated = np.broadcast_to(lights.intensity, (len(lights), measured.shape[2])).astype(np.float64)
-    floor = 0.05 * float(np.nanmean(measured))
+    least = least_radiance(measured)
     used = replace(lights, intensity=stated)
     log_gain = trend = np.zeros(stated.shape)
     for _ in range(_ROUNDS + 1):
         maps = pixels.fit(used)
         radiance = pixels.radiance(maps, used)
         matte = pixels.radiance(maps, used, highlights=False)
-        log_gain = log_gain - trend + _log_strength(measured, radiance, matte, clipped, floor)
+        log_gain = log_gain - trend + _log_strength(measured, radiance, matte, clipped, least)
         log_gain -= np.median(log_gain)
-        trend = _trend(lights.direction, log_gain)
+        trend = find_trend(lights.direction, log_gain)
         used = replace(used, intensity=stated * np.exp(log_gain - trend))
     return Calibration(used, np.exp(log_gain), np.exp(trend))
 
 
 def _log_strength(
-    measured: Values, radiance: Values, matte: Values, clipped: NDArray[np.bool_], floor: float
+    measured: Values, radiance: Values, matte: Values, clipped: NDArray[np.bool_], least: float
 ) -> Array:
     """Return for each light and channel the weighted median of ln(measured / radiance), shape (L, C)."""
     result = np.zeros((measured.shape[0], measured.shape[2]))
-    usable = (measured > floor) & (radiance > floor) & ~clipped
 
     def find(place: tuple[int, int]) -> None:
         light, channel = place
-        here = usable[light, :, channel]
-        if here.sum() < 16:
-            return
-        one, other = measured[light, here, channel], radiance[light, here, channel]
-        highlight = 1.0 - matte[light, here, channel] / other
-        known = 1.0 / (1.0 + np.square(highlight / _HIGHLIGHT))
-        result[place] = _weighted_median(np.log(one / other), np.minimum(one, other) * known)
+        one = (light, slice(None), channel)
+        ratio, weight = log_ratio(measured[one], radiance[one], matte[one], clipped[one], least)
+        usable = weight > 0.0
+        if usable.sum() >= 16:
+            result[place] = _weighted_median(ratio[usable], weight[usable])
 
     with ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="strengths") as pool:
         list(pool.map(find, np.ndindex(result.shape)))
@@ -252,36 +246,3 @@ def _weighted_median(values: Values, weights: Values) -> float:
     order = np.argsort(values)
     sums = np.cumsum(weights[order])
     return float(values[order][np.searchsorted(sums, sums[-1] / 2)])
-
-
-def _trend(direction: Array, log_gain: Array) -> Array:
-    """Return the quadratic function of direction that describes values (L, C), at the lights.
-
-    It is each channel's median where lights, left out, are not told by that function: of strengths that have
-    nothing to do with direction, the trend is chance.
-    """
-    x, y, z = direction.T
-    terms = np.stack([np.ones_like(x), x, y, z, x * x, y * y, x * y], axis=1)
-    level = np.broadcast_to(np.median(log_gain, axis=0), log_gain.shape)
-    if len(direction) < 3 * terms.shape[1]:
-        return level
-    fitted, left_out = zip(*(_robust_fit(terms, column) for column in log_gain.T), strict=True)
-    if np.abs(left_out).mean() > TELLING * np.abs(log_gain - level).mean():
-        return level
-    return np.stack(fitted, axis=1)
-
-
-def _robust_fit(terms: Array, log_gain: Array) -> tuple[Array, Array]:
-    """Return the combination of terms (L, T) that robustly describes values (L,), and its left-out errors."""
-    ridge = 0.1 * np.eye(terms.shape[1])
-    ridge[0, 0] = 0.0
-    weight = np.ones_like(log_gain)
-    hat = np.eye(len(log_gain))
-    for _ in range(20):
-        weighted = terms * weight[:, None]
-        hat = terms @ np.linalg.solve(terms.T @ weighted + ridge, weighted.T)
-        rest = log_gain - hat @ log_gain
-        scale = 2.0 * 1.4826 * np.median(np.abs(rest)) + 1e-9
-        weight = 1.0 / (1.0 + np.square(rest / scale))
-    fitted = hat @ log_gain
-    return fitted, (log_gain - fitted) / (1.0 - np.diag(hat))
