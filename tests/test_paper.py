@@ -16,6 +16,7 @@ from impasto.errors import OptionError
 from impasto.fit import FitOptions
 from impasto.fit.paper import Paper
 from impasto.fit.paper.crossing import Crossing
+from impasto.fit.paper.survey import survey
 from impasto.fit.paper.threshold import choose_threshold
 from impasto.geometry import Camera, direction_tilts, dome_direction
 from impasto.models import MODELS
@@ -280,6 +281,24 @@ def test_clipped_pixels_are_not_asked_for_the_peak(tmp_path):
     all_clipped = photograph(tmp_path / "c", reflect, noise=0.0, clip_level=0.1)
     with pytest.raises(OptionError, match="every one of the 1536 pixels has a clipped sample"):
         fitted(all_clipped)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_peak_is_that_of_a_search_through_all_samples(tmp_path, seed):
+    rng = np.random.default_rng(seed)
+    lights = arm(arm_deg=np.array([-50.0, -20.0, 0.0, 20.0, 50.0]))
+    # Two tiles; each channel is brightest under a light of its own, so that the bounds tell little.
+    images = rng.uniform(0, 1, (5, 8, 600, 3)).astype(np.float32)
+    images[rng.uniform(size=images.shape) < 0.01] = np.nan
+    images[:, 2, 3] = np.nan
+    store = store_images(tmp_path / "s", images, lights, view(), clip_level=0.995)
+    found = survey(stores.open_stack(store), range(5), show_progress=False)
+    clipped = np.nanmax(images, axis=(0, 3), initial=0) >= np.float32(0.995)
+    brightness = np.where(clipped, -np.inf, images.mean(axis=-1))
+    light, row, column = np.unravel_index(np.nanargmax(brightness), brightness.shape)
+    assert (found.row, found.column, found.light) == (row, column, light)
+    np.testing.assert_array_equal(found.peak[:, 0], images[:, row, column])
+    assert found.clipped_pixels == np.count_nonzero(clipped)
 
 
 def test_an_interrupted_fit_goes_on_to_the_same_bytes(bumpy, monkeypatch):
