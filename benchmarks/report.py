@@ -46,7 +46,7 @@ def machine() -> dict[str, Any]:
     if information.is_file():
         names = [line for line in information.read_text().splitlines() if line.startswith("model name")]
         processor = names[0].split(":", 1)[1].strip() if names else processor
-    packages = ("impasto", "numpy", "scipy", "zarr", "numcodecs", "tifffile", "imagecodecs")
+    packages = ("impasto", "numpy", "scipy", "zarr", "tifffile", "imagecodecs")
     return {
         "processor": processor,
         "cores": os.cpu_count(),
