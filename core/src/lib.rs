@@ -6,6 +6,7 @@
 #![allow(clippy::needless_range_loop)]
 
 mod arrow;
+mod codec;
 mod correct;
 mod dispatch;
 mod dual;

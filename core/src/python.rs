@@ -1,5 +1,6 @@
 //! The Python module `impasto._core`: arrays in, arrays out. Nothing else in the crate knows Python.
 
+use crate::codec;
 use crate::correct::{Correction, Grid, Stored};
 use crate::dispatch;
 use crate::geometry::{Illumination, Place};
@@ -12,7 +13,10 @@ use crate::render::{Parameters, Scene};
 use crate::residual::{Codes, LeftOver, Residual};
 use crate::robust::Loss;
 use crate::slopes;
-use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{
+    IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray1,
+    PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice};
@@ -590,11 +594,32 @@ fn parse_grid<'a>(grid: &'a PyReadonlyArray3<'_, f32>) -> PyResult<Grid<'a>> {
     Ok(Grid { values: grid.as_slice()?, rows: grid.shape()[0], columns: grid.shape()[1] })
 }
 
+/// Compresses bytes by zstd, with a checksum; see `impasto.store.zstd`.
+#[pyfunction]
+fn zstd_encode<'py>(py: Python<'py>, data: PyReadonlyArray1<'py, u8>, level: i32) -> PyResult<Bound<'py, PyAny>> {
+    let data = data.as_slice()?;
+    let frame = py.detach(|| codec::compress(data, level))?;
+    Ok(frame.into_pyarray(py).into_any())
+}
+
+/// Decompresses a frame of zstd into `out`.
+#[pyfunction]
+fn zstd_decode(py: Python<'_>, frame: &[u8], mut out: PyReadwriteArray1<'_, u8>) -> PyResult<()> {
+    let out = out.as_slice_mut()?;
+    py.detach(|| codec::decompress(frame, out)).map_err(|error| invalid(error.to_string()))
+}
+
+/// Length of what a frame of zstd holds.
+#[pyfunction]
+fn zstd_length(frame: &[u8]) -> PyResult<usize> {
+    codec::length(frame).map_err(|error| invalid(error.to_string()))
+}
+
 #[pymodule]
 mod _core {
     #[pymodule_export]
     use super::{
         available_instructions, basis, basis_slopes, correct, fit, instructions, left_over, models, render,
-        specular_scale,
+        specular_scale, zstd_decode, zstd_encode, zstd_length,
     };
 }

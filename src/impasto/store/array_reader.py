@@ -18,9 +18,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from impasto.store.codecs import decompress, strings_decode, zstd_decode
 from impasto.store.shards import Place, chunk_in, read_index
 
 Region = tuple[slice, ...]
+
+# How a chunk is made of values, and how it is compressed.
+_ENCODINGS = {("bytes", "zstd"), ("bytes", "gzip"), ("vlen-utf8", "zstd"), ("vlen-utf8", "gzip")}
 
 
 @dataclass(frozen=True)
@@ -44,9 +48,9 @@ class ArrayReader:
     document: Mapping[str, Any] = field(repr=False)
 
     def __post_init__(self) -> None:
-        names = [codec["name"] for codec in self._codecs]
-        if len(names) != 2 or names[0] not in ("bytes", "vlen-utf8") or names[1] not in ("zstd", "gzip"):
-            raise ValueError(f"its chunks are encoded by {', '.join(names)}, expected bytes and zstd or gzip")
+        if self._encoding not in _ENCODINGS:
+            names = ", ".join(self._encoding)
+            raise ValueError(f"its chunks are encoded by {names}, expected bytes and zstd or gzip")
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
@@ -74,10 +78,13 @@ class ArrayReader:
         first = self.document["codecs"][0]
         return first["configuration"] if first["name"] == "sharding_indexed" else None
 
-    @property
-    def _codecs(self) -> Sequence[Mapping[str, Any]]:
-        codecs: Sequence[Mapping[str, Any]] = (self._sharding or self.document)["codecs"]
-        return codecs
+    @cached_property
+    def _encoding(self) -> tuple[str, ...]:
+        return tuple(codec["name"] for codec in (self._sharding or self.document)["codecs"])
+
+    @cached_property
+    def _zstd(self) -> bool:
+        return self._encoding == ("bytes", "zstd")
 
     @cached_property
     def _chunk(self) -> tuple[int, ...]:
@@ -88,14 +95,6 @@ class ArrayReader:
     def _grid(self) -> tuple[int, ...]:
         """Chunks in a file along each axis."""
         return tuple(piece // chunk for piece, chunk in zip(self._piece, self._chunk, strict=True))
-
-    @cached_property
-    def _decode(self) -> Callable[..., Any]:
-        from numcodecs.gzip import GZip
-        from numcodecs.zstd import Zstd
-
-        decode: Callable[..., Any] = {"zstd": Zstd, "gzip": GZip}[self._codecs[1]["name"]]().decode
-        return decode
 
     def lost(self, *slices: slice) -> list[Place]:
         """Return the files, by their number, that a selection needs and lacks: impasto writes every one.
@@ -163,17 +162,16 @@ class ArrayReader:
         if data is None:
             fill_value = self.document["fill_value"]
             target[...] = np.nan if fill_value == "NaN" else fill_value
-        elif target.shape == self._chunk and target.flags.c_contiguous and self.dtype != object:
-            self._decode(data, target)
+        elif self._zstd and target.shape == self._chunk and target.flags.c_contiguous:
+            zstd_decode(data, target)
         else:
-            target[...] = self._values(self._decode(data))[wanted]
+            target[...] = self._values(data)[wanted]
 
-    def _values(self, decoded: Any) -> NDArray[Any]:
-        if self.dtype == object:
-            from numcodecs.vlen import VLenUTF8
-
-            strings: NDArray[Any] = VLenUTF8().decode(decoded)
-            return strings.reshape(self._chunk)
+    def _values(self, data: bytes) -> NDArray[Any]:
+        values, compressor = self._encoding
+        decoded = decompress(data, compressor)
+        if values == "vlen-utf8":
+            return np.array(strings_decode(bytes(decoded)), object).reshape(self._chunk)
         return np.frombuffer(decoded, self.dtype.newbyteorder("<")).reshape(self._chunk)
 
 

@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from impasto.store.codecs import zstd_encode
 from impasto.store.layout import ZSTD
 
 
 def encode_chunks(
     values: NDArray[Any], size: int, fill_value: float, zstd: Mapping[str, Any] = ZSTD
-) -> Iterator[tuple[tuple[int, int], bytes]]:
+) -> Iterator[tuple[tuple[int, int], memoryview]]:
     """Cut pixels into chunks of `size` x `size` and yield each, by its row and column, as it lies on disk.
 
     Parameters
@@ -31,9 +32,6 @@ def encode_chunks(
     zstd : mapping, optional
         Options of the compressor.
     """
-    from numcodecs.zstd import Zstd
-
-    compressor = Zstd(**zstd)
     dtype = values.dtype.newbyteorder("<")
     for row, column in product(*(range(-(-length // size)) for length in values.shape[:2])):
         part = values[row * size : (row + 1) * size, column * size : (column + 1) * size]
@@ -42,4 +40,4 @@ def encode_chunks(
         else:
             chunk = np.full((size, size, *values.shape[2:]), fill_value, dtype)
             chunk[: part.shape[0], : part.shape[1]] = part
-        yield (row, column), compressor.encode(chunk)
+        yield (row, column), zstd_encode(chunk, zstd["level"])

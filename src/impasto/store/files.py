@@ -37,7 +37,7 @@ def write_json(path: Path, value: Mapping[str, Any]) -> None:
     write_whole(path, json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False).encode())
 
 
-def write_whole(path: Path, *parts: bytes) -> None:
+def write_whole(path: Path, *parts: bytes | memoryview) -> None:
     """Write `parts`, one after the other; a kill leaves the old file or the new one, never a part of it."""
     with whole_file(path) as file:
         file.writelines(parts)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from impasto.errors import Problem, StoreError
 from impasto.store.array_reader import ArrayReader
 from impasto.store.arrays import array_document
+from impasto.store.codecs import strings_encode, zstd_encode
 from impasto.store.files import is_partial, write_json, write_whole, writing
 from impasto.store.layout import FITS, PYRAMIDS, SCHEMA, ZSTD
 
@@ -157,9 +158,6 @@ def write_table(
 
     Strings are those of variable length; `rows` divides the length of numbers.
     """
-    from numcodecs.vlen import VLenUTF8
-    from numcodecs.zstd import Zstd
-
     names = not isinstance(values, np.ndarray)
     data = np.array(values, object) if names else np.ascontiguousarray(values)
     rows = rows or len(data)
@@ -173,14 +171,15 @@ def write_table(
         attributes=attributes,
     )
     write_array_metadata(store, path, document)
-    compressor = Zstd(**ZSTD)
     ending = "/0" * (data.ndim - 1)
     with writing(store, path):
         for number in range(0, len(data), rows):
             part = data[number : number + rows]
-            little_endian = part.dtype.newbyteorder("<")
-            chunk = VLenUTF8().encode(part) if names else part.astype(little_endian, copy=False)
-            write_whole(store / path / f"c/{number // rows}{ending}", compressor.encode(chunk))
+            if names:
+                chunk = np.frombuffer(strings_encode(part.tolist()), np.uint8)
+            else:
+                chunk = part.astype(part.dtype.newbyteorder("<"), copy=False)
+            write_whole(store / path / f"c/{number // rows}{ending}", zstd_encode(chunk, ZSTD["level"]))
 
 
 def open_array(store: Path, path: str) -> ArrayReader:

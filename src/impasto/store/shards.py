@@ -36,7 +36,7 @@ class Shard:
         self._index = np.full((*grid, 2), _NONE, "<u8")
         self._end = 0
 
-    def put(self, place: Place, chunk: bytes) -> None:
+    def put(self, place: Place, chunk: bytes | memoryview) -> None:
         """Append a chunk, by its place in the grid."""
         self._index[place] = self._end, len(chunk)
         self._end += self._file.write(chunk)
