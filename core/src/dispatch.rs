@@ -19,6 +19,10 @@ use std::sync::LazyLock;
 /// Pixels that one thread takes at a time: enough to hide the start of a task, few enough to share a tile evenly.
 pub const BLOCK: usize = 32 * LANES;
 
+/// Blocks that a thread takes at a time. Rayon by itself would cut the work of two threads into four parts, and one thread
+/// would often wait for the other, because files are read and written meanwhile.
+pub const BLOCKS_AT_A_TIME: usize = 8;
+
 /// Channels that the fit is compiled for: stacks of fewer leave the rest without weight.
 pub const MAX_CHANNELS: usize = 3;
 
@@ -35,11 +39,17 @@ pub struct Entry {
     pub reciprocal: bool,
 }
 
-/// A fitted tile: one row of numbers per pixel, as its layout says.
+/// A fitted tile: the maps that its layout names.
 pub struct Fitted {
-    pub layout: Layout,
-    pub rows: Vec<f32>,
+    pub maps: Vec<Map>,
     pub status: Vec<u8>,
+}
+
+/// One quantity of all pixels of a tile, `width` values for each.
+pub struct Map {
+    pub name: &'static str,
+    pub width: usize,
+    pub values: Vec<f32>,
 }
 
 /// The instructions that the fit and the renderer run with: the best that the processor has, unless the environment
@@ -116,11 +126,29 @@ fn fit_tile<F: FitBlock>(
     fit_block: impl Fn(&mut F, usize, &mut [f32], &mut [u8]) + Sync + Send,
 ) -> Fitted {
     let width = layout.width();
-    let mut rows = vec![0.0; pixels * width];
+    let used = layout.columns.into_iter().filter(|(_, width)| *width > 0);
+    let mut maps: Vec<_> = used.map(|(name, width)| Map { name, width, values: vec![0.0; pixels * width] }).collect();
     let mut status = vec![0; pixels];
-    let blocks = rows.par_chunks_mut(BLOCK * width).zip(status.par_chunks_mut(BLOCK)).enumerate();
-    blocks.for_each_init(make, |fit, (block, (rows, status))| fit_block(fit, block * BLOCK, rows, status));
-    Fitted { layout, rows, status }
+    let mut blocks: Vec<_> = status.chunks_mut(BLOCK).map(|status| (Vec::new(), status)).collect();
+    for map in &mut maps {
+        for (part, (parts, _)) in map.values.chunks_mut(BLOCK * map.width).zip(&mut blocks) {
+            parts.push((map.width, part));
+        }
+    }
+    let make = || (make(), vec![0.0; BLOCK * width]);
+    let blocks = blocks.par_iter_mut().enumerate().with_max_len(BLOCKS_AT_A_TIME);
+    blocks.for_each_init(make, |(fit, rows), (block, (parts, status))| {
+        let rows = &mut rows[..status.len() * width];
+        fit_block(fit, block * BLOCK, rows, status);
+        let mut first = 0;
+        for (columns, part) in parts {
+            for (row, values) in rows.chunks(width).zip(part.chunks_mut(*columns)) {
+                values.copy_from_slice(&row[first..first + *columns]);
+            }
+            first += *columns;
+        }
+    });
+    Fitted { maps, status }
 }
 
 fn plain_priors<M: Model<L>, const L: usize>() -> Vec<Option<(f64, f64)>> {

@@ -2,13 +2,12 @@
 
 use crate::codec;
 use crate::correct::{Correction, Grid, Stored};
-use crate::dispatch;
+use crate::dispatch::{self, Fitted, Map};
 use crate::geometry::{Illumination, Place};
 use crate::joint::Options;
 use crate::models::{FresnelAngle, Optics};
 use crate::observations::{Belief, Noise, Samples, Stack};
 use crate::paper::Sample;
-use crate::record::Layout;
 use crate::render::{Parameters, Scene};
 use crate::residual::{Codes, LeftOver, Residual};
 use crate::robust::Loss;
@@ -19,7 +18,7 @@ use numpy::{
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PySlice};
+use pyo3::types::PyDict;
 
 fn invalid(message: impl Into<String>) -> PyErr {
     PyValueError::new_err(message.into())
@@ -246,26 +245,22 @@ fn fit<'py>(
             }
         })
         .ok_or_else(|| invalid(format!("the paper's procedure is not defined for {model}")))?;
-    into_dict(py, fitted.layout, fitted.rows, fitted.status)
+    into_dict(py, fitted)
 }
 
-/// Rows of a fit as one array per quantity, views of the same memory.
-fn into_dict(py: Python<'_>, layout: Layout, rows: Vec<f32>, status: Vec<u8>) -> PyResult<Bound<'_, PyDict>> {
-    let pixels = status.len();
-    let rows = rows.into_pyarray(py).reshape([pixels, layout.width()])?;
+/// The maps of a fit as one array each.
+fn into_dict(py: Python<'_>, fitted: Fitted) -> PyResult<Bound<'_, PyDict>> {
+    let pixels = fitted.status.len();
     let dict = PyDict::new(py);
-    let all = PySlice::full(py);
-    let mut first = 0;
-    for (name, width) in layout.columns {
-        let scalar = matches!(name, "chi2_reduced" | "residual_rms" | "normal_sd" | "view_tilt");
-        if scalar {
-            dict.set_item(name, rows.get_item((&all, first))?)?;
-        } else if width > 0 {
-            dict.set_item(name, rows.get_item((&all, PySlice::new(py, first as isize, (first + width) as isize, 1)))?)?;
+    for Map { name, width, values } in fitted.maps {
+        let values = values.into_pyarray(py);
+        if matches!(name, "chi2_reduced" | "residual_rms" | "normal_sd" | "view_tilt") {
+            dict.set_item(name, values)?;
+        } else {
+            dict.set_item(name, values.reshape([pixels, width])?)?;
         }
-        first += width;
     }
-    dict.set_item("status", status.into_pyarray(py))?;
+    dict.set_item("status", fitted.status.into_pyarray(py))?;
     Ok(dict)
 }
 

@@ -3,7 +3,7 @@
 //! It is taken and added on the scale f(Y) = √(max(Y, 0) + a) − √a of radiance over irradiance; the constant √a drops out
 //! of every difference here.
 
-use crate::dispatch::BLOCK;
+use crate::dispatch::{BLOCK, BLOCKS_AT_A_TIME};
 use crate::lanes::{Isa, LANES, Lane, outlined};
 use crate::number::{Number, Real, array};
 use crate::observations::Samples;
@@ -120,7 +120,8 @@ impl LeftOver<'_> {
             let rest = shading.relative.clone();
             (shading, rest)
         };
-        out.par_chunks_mut(BLOCK * width).enumerate().for_each_init(make, |(shading, rest), (block, out)| {
+        let blocks = out.par_chunks_mut(BLOCK * width).enumerate().with_max_len(BLOCKS_AT_A_TIME);
+        blocks.for_each_init(make, |(shading, rest), (block, out)| {
             for (group, out) in out.chunks_mut(LANES * width).enumerate() {
                 let first = block * BLOCK + group * LANES;
                 shade(self.scene, first, shading);
