@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -63,22 +65,12 @@ class CalibrationSummary:
 
 def commands(photos: Path, folder: Path, size: tuple[int, int]) -> tuple[str, ...]:
     """Return the commands that do what `calibrate_studio` does, without the program's name."""
-    shots, made = photos / "calibration", folder / PART
-    box = ",".join(str(edge) for edge in _middle(size))
-    frontal = _frontal(read_capture(photos).lights)
-    return (
-        f"calibrate lights {shots}/spheres --camera {photos}/capture.toml --out {made}/lights",
-        f"calibrate oecf {shots}/grey_scale.tif {shots}/grey_scale.csv {made}/oecf.json "
-        f"--card {shots}/grey_scale_card.tif --dark {shots}/dark.tif",
-        f"calibrate dark {shots}/dark.tif {made}/dark.json",
-        f"calibrate flat {shots}/white_card.tif {made}/flat.json --dark {made}/dark.json",
-        f"calibrate white {shots}/white_card.tif {made}/white.json --box {box} --reflectance 1 "
-        f"--lights {made}/lights/lights.toml --light {frontal}",
-        f"calibrate colour {shots}/colour_chart.tif {shots}/colour_chart.csv {made}/colour.json "
-        f"--card {shots}/white_card.tif --dark {made}/dark.json",
-        f"calibrate glare {shots}/glare.tif "
-        + " ".join(f"--{name} {','.join(map(str, box))}" for name, box in _areas(shots).items()),
-        f"calibrate steadiness {photos} {made}/steadiness.json",
+    return tuple(
+        " ".join(
+            ["calibrate", kind, *map(str, files)]
+            + [f"--{name} {_written(value)}" for name, value in options.items()]
+        )
+        for kind, files, options in _shots(photos, folder, size)
     )
 
 
@@ -98,39 +90,53 @@ def calibrate_studio(photos: Path, folder: Path, size: tuple[int, int]) -> Calib
     -------
     CalibrationSummary
     """
-    shots, made = photos / "calibration", folder / PART
-    lights = calibrate.lights(shots / "spheres", made / "lights", camera=photos / "capture.toml")
-    response = calibrate.oecf(
-        shots / "grey_scale.tif",
-        shots / "grey_scale.csv",
-        made / "oecf.json",
-        card=shots / "grey_scale_card.tif",
-        dark=shots / "dark.tif",
-    )
-    dark = calibrate.dark(shots / "dark.tif", made / "dark.json")
-    flat = calibrate.flat(shots / "white_card.tif", made / "flat.json", dark=dark.file)
-    true = read_capture(photos).lights
-    white = calibrate.white(
-        shots / "white_card.tif",
-        made / "white.json",
-        box=_middle(size),
-        reflectance=1,
-        lights=made / "lights" / "lights.toml",
-        light=_frontal(true),
-    )
-    colour = calibrate.colour(
-        shots / "colour_chart.tif",
-        shots / "colour_chart.csv",
-        made / "colour.json",
-        card=shots / "white_card.tif",
-        dark=dark.file,
-    )
-    areas = _areas(shots)
-    glare = calibrate.glare(shots / "glare.tif", trap=areas["trap"], bright=areas["bright"])
-    steadiness = calibrate.steadiness(photos, made / "steadiness.json")
+    found: dict[str, Any] = {
+        kind: getattr(calibrate, kind)(*files, **options)
+        for kind, files, options in _shots(photos, folder, size)
+    }
+    true, lights = read_capture(photos).lights, found["lights"]
     order = [true.names.index(name) for name in lights.names]
     off_deg = float(np.median(degrees_between(true.direction[order], lights.lights.direction)))
-    return CalibrationSummary(lights, off_deg, response, dark, flat, white, colour, glare, steadiness)
+    return CalibrationSummary(off_deg=off_deg, response=found.pop("oecf"), **found)
+
+
+def _shots(
+    photos: Path, folder: Path, size: tuple[int, int]
+) -> Iterator[tuple[str, tuple[Path, ...], dict[str, Any]]]:
+    """Yield each `calibrate` command, the files that it takes and makes, and its options by name."""
+    shots, made = photos / "calibration", folder / PART
+    lights, dark, card = made / "lights", made / "dark.json", shots / "white_card.tif"
+    scale, chart = shots / "grey_scale.tif", shots / "colour_chart.tif"
+    yield "lights", (shots / "spheres",), {"camera": photos / "capture.toml", "out": lights}
+    yield (
+        "oecf",
+        (scale, scale.with_suffix(".csv"), made / "oecf.json"),
+        {"card": shots / "grey_scale_card.tif", "dark": shots / "dark.tif"},
+    )
+    yield "dark", (shots / "dark.tif", dark), {}
+    yield "flat", (card, made / "flat.json"), {"dark": dark}
+    yield (
+        "white",
+        (card, made / "white.json"),
+        {
+            "box": _middle(size),
+            "reflectance": 1,
+            "lights": lights / "lights.toml",
+            "light": _frontal(read_capture(photos).lights),
+        },
+    )
+    yield (
+        "colour",
+        (chart, chart.with_suffix(".csv"), made / "colour.json"),
+        {"card": card, "dark": dark},
+    )
+    yield "glare", (shots / "glare.tif",), _areas(shots)
+    yield "steadiness", (photos, made / "steadiness.json"), {}
+
+
+def _written(value: Any) -> str:
+    """Return an option's value as the command line takes it."""
+    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
 def _areas(shots: Path) -> dict[str, tuple[int, ...]]:
