@@ -8,6 +8,8 @@ import tifffile
 
 import impasto
 from impasto.errors import OptionError
+from impasto.geometry import Camera
+from impasto.stand.checks.spheres import check_spheres
 
 SIZE = (400, 600)
 PHOTOGRAPH = 400 * 600 * 3 * 2
@@ -73,6 +75,21 @@ def test_lights_are_found_from_one_photograph_at_a_time(tmp_path):
     found, large = peak_bytes(lambda: lights(tmp_path / "12"))
     assert len(found.names) == 12
     assert large < small + PHOTOGRAPH
+
+
+def test_spheres_are_checked_one_photograph_at_a_time(tmp_path):
+    def check(count):
+        paths = {path.stem: path for path in sorted((tmp_path / str(count)).iterdir())}
+        return check_spheres(paths, dict.fromkeys(paths, np.array([0.0, 0.0, 1.0])), Camera())
+
+    many(tmp_path / "3", 3, image=lamp_in_spheres)
+    many(tmp_path / "12", 12, image=lamp_in_spheres)
+    check(3)  # imports
+    _, small = peak_bytes(lambda: check(3))
+    (misplaced,), large = peak_bytes(lambda: check(12))
+    assert len(misplaced.photographs) == 12
+    # More lamps have more edges, among which spheres are looked for; nine photographs would take 22 such.
+    assert large < small + 4 * PHOTOGRAPH
 
 
 def test_a_grey_scale_s_exposures_are_read_one_at_a_time(tmp_path):

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from impasto.calibrate.files import write_calibration
 from impasto.calibrate.mirror import (
@@ -18,11 +17,11 @@ from impasto.calibrate.mirror import (
     find_reflection,
     given_sphere,
     locate_sphere,
-    sphere_window,
 )
 from impasto.calibrate.outline import circle_problem, find_circles, outline_points
 from impasto.calibrate.shots import Shot, box_problems, one_by_one, photographs_in
 from impasto.calibrate.sphere_picture import draw_spheres, thinned
+from impasto.calibrate.sphere_windows import SphereWindow, cut_out
 from impasto.calibrate.triangulate import Placed, place_light
 from impasto.capture.light_files import read_camera
 from impasto.capture.manifest import light_positions, manifest
@@ -272,47 +271,25 @@ def _find_spheres(
     return found, rays
 
 
-@dataclass(frozen=True)
-class _Window:
-    """What all photographs show of one sphere, shape (L, rows, columns): float32 luminance, and clipped."""
-
-    level: NDArray[np.float32]
-    clipped: NDArray[np.bool_]
-
-    def background(self) -> NDArray[np.float32]:
-        """Return what is seen whatever lamp is lit, shape (rows, columns)."""
-        if len(self.level) < 2:
-            return np.zeros_like(self.level[0])
-        if len(self.level) == 2:
-            return np.asarray(self.level.min(axis=0))
-        # Row by row, because a median copies what it is of.
-        return np.stack([np.median(self.level[:, row], axis=0) for row in range(self.level.shape[1])])
-
-
 def _cut_out(
     paths: Sequence[Path], spheres: Sequence[Sphere], card: Sequence[int] | None, rays: Rays
-) -> tuple[list[_Window], list[Shot]]:
+) -> tuple[list[SphereWindow], list[Shot]]:
     """Return what all photographs show of each sphere, and of the card if there is one."""
-    places = [sphere_window(sphere, rays.height, rays.width) for sphere in spheres]
-    windows = []
-    for rows, columns in places:
-        shape = (len(paths), rows.stop - rows.start, columns.stop - columns.start)
-        windows.append(_Window(np.empty(shape, np.float32), np.empty(shape, bool)))
     on_card = []
-    for light, shot in enumerate(one_by_one(paths)):
-        for window, place in zip(windows, places, strict=True):
-            part = shot.part(place)
-            window.level[light] = part.luminance()
-            window.clipped[light] = part.clipped.any(axis=2)
-        if card is not None:
-            left, top, right, bottom = card
-            on_card.append(shot.part((slice(top, bottom), slice(left, right))))
-    return windows, on_card
+
+    def read() -> Iterator[Shot]:
+        for shot in one_by_one(paths):
+            yield shot
+            if card is not None:
+                left, top, right, bottom = card
+                on_card.append(shot.part((slice(top, bottom), slice(left, right))))
+
+    return cut_out(read(), len(paths), spheres, rays), on_card
 
 
 def _reflections(
     paths: Sequence[Path],
-    windows: Sequence[_Window],
+    windows: Sequence[SphereWindow],
     kept: Sequence[int],
     spheres: Sequence[Sphere],
     rays: Rays,

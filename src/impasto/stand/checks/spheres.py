@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, label
 
-from impasto.calibrate.mirror import Rays, find_reflection, given_sphere, sphere_window
+from impasto.calibrate.mirror import Rays, Sphere, find_reflection, given_sphere
 from impasto.calibrate.outline import Circle, find_circles
-from impasto.calibrate.shots import read_shots
+from impasto.calibrate.shots import one_by_one
+from impasto.calibrate.sphere_windows import SphereWindow, cut_out
 from impasto.geometry import Array, Camera
 from impasto.stand.checks.finding import Finding
 
@@ -68,48 +69,54 @@ def check_spheres(paths: Mapping[str, Path], planned: Mapping[str, Array], camer
     """
     if not paths:
         return []
-    shots = read_shots(paths.values())
-    images = [shot.linear().mean(axis=2).astype(np.float64) for shot in shots]
-    clipped = [np.asarray(shot.clipped.any(axis=2)) for shot in shots]
-    circles = find_circles(np.mean(images, axis=0))
+    # One photograph at a time is in memory, and all are read twice: the spheres are found in their mean.
+    mean = np.zeros((1, 1))
+    for shot in one_by_one(paths.values()):
+        mean = mean + shot.luminance()
+    mean /= len(paths)
+    rays = Rays(camera, *mean.shape)
+    spheres = [given_sphere(circle, rays) for circle in find_circles(mean)]
+    if not spheres:
+        return []
+    windows = cut_out(one_by_one(paths.values()), len(paths), spheres, rays)
     findings = []
-    for circle in circles:
-        seen = [highlight(image, lost, circle) for image, lost in zip(images, clipped, strict=True)]
+    for sphere, window in zip(spheres, windows, strict=True):
+        column, row, radius = sphere.circle
+        circle = (column - window.columns.start, row - window.rows.start, radius)
+        seen = [
+            highlight(level.astype(np.float64), lost, circle)
+            for level, lost in zip(window.level, window.clipped, strict=True)
+        ]
         findings += [
             Finding(
                 "sphere",
                 (name,),
-                f"the highlight on the sphere at column {circle[0]:.0f}, row {circle[1]:.0f} {what}",
+                f"the highlight on the sphere at column {column:.0f}, row {row:.0f} {what}",
                 "Blow or wipe the dust off the sphere, and take it again",
             )
             for name, what in zip(paths, faults(seen), strict=True)
             if what
         ]
-    found = lamp_directions(images, clipped, circles, camera)
+    found = lamp_directions(windows, spheres, rays)
     directions = {name: at for name, at in zip(paths, found, strict=True) if at is not None}
     return findings + misplaced(directions, planned)
 
 
 def lamp_directions(
-    images: Sequence[Array], clipped: Sequence[NDArray[np.bool_]], circles: Sequence[Circle], camera: Camera
+    windows: Sequence[SphereWindow], spheres: Sequence[Sphere], rays: Rays
 ) -> list[Array | None]:
     """Return the direction of the lamp that is seen in each picture, None where none is."""
-    if len(images) < _LEAST_LAMPS or not circles:
-        return [None] * len(images)
-    rays = Rays(camera, *images[0].shape)
-    spheres = [given_sphere(circle, rays) for circle in circles]
-    windows = [sphere_window(sphere, rays.height, rays.width) for sphere in spheres]
-    # What most lamps leave as it is, is the room.
-    background = np.median(images, axis=0)
-    found: list[Array | None] = []
-    for image, lost in zip(images, clipped, strict=True):
-        seen = [
-            find_reflection(image[at], background[at], lost[at], sphere, rays)
-            for sphere, at in zip(spheres, windows, strict=True)
-        ]
-        directions = [reflection.direction for reflection in seen if reflection is not None]
-        found.append(np.median(directions, axis=0) if directions else None)
-    return found
+    count = len(windows[0].level)
+    if count < _LEAST_LAMPS:
+        return [None] * count
+    seen: list[list[Array]] = [[] for _ in range(count)]
+    for window, sphere in zip(windows, spheres, strict=True):
+        background = window.background()
+        for directions, level, lost in zip(seen, window.level, window.clipped, strict=True):
+            reflection = find_reflection(level, background, lost, sphere, rays)
+            if reflection is not None:
+                directions.append(reflection.direction)
+    return [np.median(directions, axis=0) if directions else None for directions in seen]
 
 
 def misplaced(directions: Mapping[str, Array], planned: Mapping[str, Array]) -> list[Finding]:
