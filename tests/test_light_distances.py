@@ -22,7 +22,7 @@ from impasto.light_distance import place_lights, without_distance
 from impasto.models import parse_model
 from impasto.publish.publication import Publication
 from impasto.render import render_bands
-from impasto.store import open_fit, open_stack
+from impasto.store import open_fit, open_published, open_stack
 
 MODEL = "torrance-sparrow"
 SIZE = (128, 96)
@@ -214,6 +214,19 @@ def test_photographs_are_published_with_the_distance_of_their_lights(near_fit):
     lights = Publication(near_fit.store).attributes["photographs"]["lights"]
     distance = np.linalg.norm([light["position_mm"] for light in lights], axis=1)
     np.testing.assert_allclose(distance, distances(near_fit)["common"] * EXTENT_MM, rtol=1e-3)
+
+
+def test_a_published_store_puts_other_lights_there_too(near_fit, tmp_path):
+    impasto.publish(near_fit.store, tmp_path / "site")
+    lights = Lights(("other",), [[0.6, 0.0, 0.8]])
+    (band,), (published,) = (
+        render_bands(fit, lights, stack.camera, residual=False)
+        for fit, stack in (
+            (near_fit, open_stack(near_fit.store)),
+            open_published(tmp_path / "site" / near_fit.store.name, MODEL),
+        )
+    )
+    np.testing.assert_allclose(published.radiance, band.radiance, rtol=0.02, atol=1e-3)
 
 
 def test_the_shares_of_the_error_know_the_distances(near_fit):

@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +107,43 @@ def test_the_page_draws_what_the_core_renders(model, published, page):
     assert differences.max() <= 2
     assert np.mean(differences <= 1) >= 0.999
     print(f"{model}: {np.mean(differences == 0):.6f} equal, {np.mean(differences <= 1):.6f} within 1")
+
+
+@pytest.mark.parametrize("scaled", [False, True])
+def test_lights_far_away_are_drawn_as_near_as_the_fit_found_its_own(scaled, published, browser, tmp_path):
+    """One distance in pixels, and one that is smooth over direction, in mm."""
+    model = "torrance-sparrow"
+    shutil.copytree(published, tmp_path / "site")
+    root = tmp_path / "site" / "painting.zarr" / "zarr.json"
+    document = json.loads(root.read_text())
+    attributes = document["attributes"]
+    told = {"distance": 1.2}
+    if scaled:
+        directions = dome_direction(np.radians([30.0, 60.0, 60.0]), np.radians([0.0, 120.0, 240.0])).tolist()
+        told |= {"direction": directions, "length": 0.5, "weights": [[0.3, -0.2, 0.4]]}
+    else:
+        attributes["camera"]["mm_per_px"] = None
+    (entry,) = [entry for entry in attributes["models"] if entry["name"] == model]
+    entry["self_calibration"] = {"distances": {"told": told}}
+    root.write_text(json.dumps(document))
+    lights, shown = random_lights(5)
+    far = [number for number in range(LIGHTS) if shown[number]["distance_mm"] is None]
+    view = {"x": WIDTH / 2, "y": HEIGHT / 2, "scale": 1}
+    expected = list(rendered(tmp_path / "site" / "painting.zarr", model, lights.select(far)))
+    distant = list(rendered(published / "painting.zarr", model, lights.select(far)))
+    with static_host(tmp_path / "site") as url:
+        page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
+        page.goto(f"{url}#model={model}")
+        complete(page)
+        states = [{"lights": [shown[number]], "view": view} for number in far]
+        drawn = list(pictures(page, states))
+        page.close()
+    differences = np.array([
+        np.abs(want.astype(int) - got).max(axis=2) for want, got in zip(expected, drawn, strict=True)
+    ])  # fmt: skip
+    assert differences.max() <= 2
+    assert np.mean(differences <= 1) >= 0.999
+    assert all(np.abs(near.astype(int) - far).mean() > 3 for near, far in zip(expected, distant, strict=True))
 
 
 def test_the_residual_is_added_only_where_asked_and_under_lights_that_tell_it(published, page):

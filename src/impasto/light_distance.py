@@ -51,6 +51,12 @@ def without_distance(attributes: Mapping[str, Any]) -> dict[str, Any]:
     return {**attributes, "self_calibration": calibration}
 
 
+def only_told(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those attributes of a fit that say where its renderings put distant lights, if it says so."""
+    told = _found(attributes)
+    return {} if told is None else {"self_calibration": {"distances": {"told": dict(told)}}}
+
+
 def _found(attributes: Mapping[str, Any]) -> Mapping[str, Any] | None:
     told = attributes.get("self_calibration", {}).get("distances", {}).get("told")
     return told if isinstance(told, Mapping) else None

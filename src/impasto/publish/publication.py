@@ -23,7 +23,7 @@ from impasto.errors import OptionError, Problem
 from impasto.evaluate.gloss import PixelGloss
 from impasto.evaluate.glossmeter import GLOSSMETERS
 from impasto.fit.pyramid import halve
-from impasto.light_distance import place_lights
+from impasto.light_distance import only_told, place_lights
 from impasto.maps.integration import integrate_normals
 from impasto.models import MODELS, parse_model
 from impasto.publish.arrays import Codes, PackedArray, pixels_of
@@ -210,6 +210,7 @@ class Publication:
             if residual is not None:
                 self._add_residual(f"models/{name}/{level}/residual", fit, residual)
         attributes = {key: fits[0].attributes[key] for key in _FIT_ATTRIBUTES if key in fits[0].attributes}
+        attributes |= only_told(fits[0].attributes)
         base = name.removesuffix("-no-ambient").removesuffix("-ambient")
         base = base if base in MODELS else name
         return {

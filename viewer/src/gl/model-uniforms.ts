@@ -1,6 +1,7 @@
 /** What the program of a model is told about the lights, the camera and the model. */
 
 import type { Attributes, GlossTable, ModelEntry, ResidualTerm } from "../store/attributes";
+import { placeLights } from "./light-distance";
 import { floatTexture, type Program } from "./program";
 import { residualBasis, residualStrength } from "./residual";
 import type { Scene, ShaderLight } from "./scene";
@@ -38,13 +39,14 @@ export class ModelUniforms {
   /** Sets all that holds for the whole frame. */
   set(program: Program, model: ModelEntry, scene: Scene): void {
     const { gl } = this;
-    const places = scene.lights.flatMap((light) => [...light.place, light.near ? 1 : 0]);
+    const lights = placeLights(scene.lights, model, this.attributes);
+    const places = lights.flatMap((light) => [...light.place, light.near ? 1 : 0]);
     gl.uniform4fv(program.at("lightPlace"), places);
     gl.uniform3fv(
       program.at("lightColour"),
-      scene.lights.flatMap((light) => [...light.colour]),
+      lights.flatMap((light) => [...light.colour]),
     );
-    program.int("lightCount", scene.lights.length);
+    program.int("lightCount", lights.length);
     const { view_direction: direction, distance_mm: distance } = this.attributes.camera;
     program.vector("camera", [...direction.map((x) => x * (distance ?? 1)), distance === null ? 0 : 1]);
     program.vector("specularColour", rgb(model.light_rgb));

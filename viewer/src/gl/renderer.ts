@@ -234,7 +234,7 @@ export class Renderer {
     program.vector("part", [0, 0, (right - left) / size, (bottom - top) / size]);
     program.int("blocks", tile.blocks);
     gl.uniform2i(program.at("last"), tile.width - 1, tile.height - 1);
-    const mm = this.#attributes.camera.mm_per_px ?? 0;
+    const mm = this.#attributes.camera.mm_per_px ?? 1; // lengths are in pixels where nothing is known
     program.vector("position", [
       (left + (size - 1) / 2 - (this.store.width - 1) / 2) * mm,
       -(top + (size - 1) / 2 - (this.store.height - 1) / 2) * mm,

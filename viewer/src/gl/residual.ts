@@ -12,18 +12,26 @@ function share(term: ResidualTerm, direction: readonly number[]): number {
   return 1 - part * part * (3 - 2 * part);
 }
 
-/** Returns for each channel the sum of weight times kernel over the fitted lights. */
+/** Returns the sum over lights n of weight n times exp(−|l − dₙ|² / 2ℓ²), of unit vectors l and dₙ. */
+export function kernelSum(
+  weights: readonly number[],
+  lights: readonly (readonly number[])[],
+  length: number,
+  direction: readonly number[],
+): number {
+  // For unit vectors |l − d|² = 2 − 2 l·d.
+  const kernel = lights.map((light) => Math.exp((Math.min(dot(light, direction), 1) - 1) / length ** 2));
+  return dot(weights, kernel);
+}
+
+/** Returns the same for each channel, over the lights of a term. */
 function series(
   term: ResidualTerm,
   channels: readonly (readonly number[])[],
   length: number,
   direction: readonly number[],
 ): [number, number, number] {
-  // For unit vectors |l − d|² = 2 − 2 l·d.
-  const kernel = term.direction.map((light) =>
-    Math.exp((Math.min(dot(light, direction), 1) - 1) / length ** 2),
-  );
-  const values = channels.map((weights) => dot(weights, kernel));
+  const values = channels.map((weights) => kernelSum(weights, term.direction, length, direction));
   return values.length === 3 ? [values[0]!, values[1]!, values[2]!] : [values[0]!, values[0]!, values[0]!];
 }
 

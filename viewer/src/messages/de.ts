@@ -68,6 +68,7 @@ export const de: typeof en = {
   azimuth: "Azimut",
   distance: "Abstand",
   farAway: "weit entfernt",
+  asPhotographed: "wie bei den Aufnahmen",
   size: "Größe",
   intensity: "Stärke",
   temperature: "Farbtemperatur",

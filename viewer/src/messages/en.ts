@@ -66,6 +66,7 @@ export const en = {
   azimuth: "Azimuth",
   distance: "Distance",
   farAway: "far away",
+  asPhotographed: "as for the photographs",
   size: "Size",
   intensity: "Intensity",
   temperature: "Temperature",

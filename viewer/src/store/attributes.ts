@@ -39,6 +39,15 @@ export interface ModelEntry {
   readonly status_meaning: Readonly<Record<string, string>>;
   readonly sample?: { arm_azimuth_deg?: number };
   readonly residual?: ResidualTerm | null;
+  readonly self_calibration?: { readonly distances?: { readonly told?: ToldDistance } };
+}
+
+/** How far away lights stood, over the painting's longer side: docs/store.md, "Lights found to be near". */
+export interface ToldDistance {
+  readonly distance: number;
+  readonly direction?: readonly (readonly number[])[];
+  readonly length?: number;
+  readonly weights?: readonly (readonly number[])[];
 }
 
 /** What a model leaves over, over the light's direction: docs/store.md, "The residual term". */
@@ -111,6 +120,8 @@ export function checked(given: unknown, where: string): Attributes {
       throw new StoreProblem("unsupported", where, entry.name);
     }
     if (entry.residual && !isWhole(entry.residual, channels)) throw bad(`models: ${entry.name}: residual`);
+    const told = entry.self_calibration?.distances?.told;
+    if (told && !isTold(told)) throw bad(`models: ${entry.name}: self_calibration`);
   }
   return { ...attributes, models: attributes.models.filter(drawable) };
 }
@@ -123,12 +134,19 @@ function drawable(entry: ModelEntry): boolean {
   return model !== undefined && entry.parameters[0]?.name === "normal" && needed.every(has);
 }
 
+const numbers = (list: unknown, count: number) =>
+  Array.isArray(list) && list.length === count && list.every(Number.isFinite);
+const vectors = (list: unknown) => Array.isArray(list) && list.every((each) => numbers(each, 3));
+
+/** Whether a distance has all its numbers. */
+function isTold({ distance, direction, length, weights }: ToldDistance): boolean {
+  const smooth = () => vectors(direction) && length! > 0 && numbers(weights![0], direction!.length);
+  return distance > 0 && (!weights || smooth());
+}
+
 /** Whether a residual term has all its numbers. */
 function isWhole(term: ResidualTerm, channels: number): boolean {
   const { components, direction, weights, hull, strength } = term;
-  const numbers = (list: unknown, count: number) =>
-    Array.isArray(list) && list.length === count && list.every(Number.isFinite);
-  const vectors = (list: unknown) => Array.isArray(list) && list.every((each) => numbers(each, 3));
   return (
     Number.isInteger(components) &&
     components >= 1 &&

@@ -214,6 +214,9 @@ export class Panel {
     ];
     if (this.#near) {
       const distance = (v: number) => (v >= FARTHEST_MM ? null : v);
+      const { models } = this.store.attributes;
+      const told = models.some((model) => model.self_calibration?.distances?.told);
+      const farthest = told ? m.asPhotographed : m.farAway;
       parts.push(
         this.#slider(
           m.distance,
@@ -222,7 +225,7 @@ export class Panel {
           10,
           (s) => light(s).distance_mm ?? FARTHEST_MM,
           (v) => this.actions.light({ distance_mm: distance(v) }),
-          (v) => (distance(v) === null ? m.farAway : `${v.toFixed(0)} mm`),
+          (v) => (distance(v) === null ? farthest : `${v.toFixed(0)} mm`),
         ),
       );
     }
