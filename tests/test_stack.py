@@ -17,7 +17,8 @@ from impasto import store as stores
 from impasto.capture import Photograph, read_capture
 from impasto.colour import decode_srgb
 from impasto.errors import CaptureError, StoreError
-from impasto.stack import _decoders, stack
+from impasto.stack import stack
+from impasto.stack.decoders import affordable_decoders
 from impasto.stack.linearise import Linearisation
 from store_files import (
     attributes,
@@ -166,7 +167,7 @@ def test_an_interrupted_stack_is_continued_to_the_same_bytes(tmp_path, monkeypat
 
     monkeypatch.setattr(Photograph, "bands", stop_in_the_fourth)
     monkeypatch.setattr(ThreadPoolExecutor, "shutdown", hear)
-    monkeypatch.setattr(sys.modules["impasto.stack"], "_decoders", lambda *_, **__: 1)
+    monkeypatch.setattr(sys.modules["impasto.stack.job"], "affordable_decoders", lambda *_, **__: 1)
     with pytest.raises(KeyboardInterrupt):
         stack(folder, path)
     with pytest.raises(StoreError, match="3 of 6 photographs"):
@@ -273,9 +274,9 @@ def test_fewer_photographs_are_decoded_at_a_time_where_memory_is_short(tmp_path,
     pictures = photographs(tmp_path) * 40
     linearise = Linearisation(pictures[0], np.inf)
     large = [type(p)(**{**vars(p), "width": 5000, "height": 3300, "unit_rows": 3300}) for p in pictures]
-    assert _decoders(pictures, linearise, 1.2e9) == 32
-    assert _decoders(large, linearise, 1.2e9) in range(3, 9)
-    assert _decoders(large, linearise, 0.2e9) == 1
+    assert affordable_decoders(pictures, linearise, 1.2e9) == 32
+    assert affordable_decoders(large, linearise, 1.2e9) in range(3, 9)
+    assert affordable_decoders(large, linearise, 0.2e9) == 1
 
 
 def test_a_stack_of_an_earlier_version_is_known_by_its_digests(tmp_path):
@@ -309,7 +310,7 @@ def test_an_unfinished_stack_of_another_layout_is_begun_anew(tmp_path):
 
 _CHILD = """
 import sys, tifffile
-from impasto.stack import _decoders, stack
+from impasto.stack import stack
 print("ready", flush=True)
 stack(sys.argv[1], sys.argv[2])
 """
