@@ -49,6 +49,16 @@ def test_help_imports_nothing_heavy():
     assert done.stdout.strip() == "[]"
 
 
+def test_a_command_that_writes_pictures_ends_without_a_word_about_memory(painting, tmp_path):
+    """OpenImageIO's binding lists what was not released when Python ends, as if it were a mistake."""
+    arguments = ["render", painting, "--model", MODEL, "--light", "30,0", "--out", tmp_path, "--raw"]
+    script = (
+        f"import sys; from impasto.cli import main; sys.argv = {['impasto', *map(str, arguments)]}; main()"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stderr == ""
+
+
 def test_the_pipeline_from_photographs_to_renderings(capture, tmp_path):
     store, data = tmp_path / "p.zarr", tmp_path / "data.json"
 
