@@ -223,7 +223,7 @@ def test_a_published_store_puts_other_lights_there_too(near_fit, tmp_path):
         render_bands(fit, lights, stack.camera, residual=False)
         for fit, stack in (
             (near_fit, open_stack(near_fit.store)),
-            open_published(tmp_path / "site" / near_fit.store.name, MODEL),
+            open_published(tmp_path / "site" / "painting.zarr", MODEL),
         )
     )
     np.testing.assert_allclose(published.radiance, band.radiance, rtol=0.02, atol=1e-3)
