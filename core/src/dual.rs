@@ -309,6 +309,14 @@ impl<R: Real, const P: usize> Number for Steered<R, P> {
         self * factor
     }
     #[inline(always)]
+    fn squared(self) -> Self {
+        self.chain(self.value * self.value, self.value + self.value)
+    }
+    #[inline(always)]
+    fn square_add(self, addend: Self) -> Self {
+        addend.plus(self, self.value + self.value).valued(self.value.mul_add(self.value, addend.value))
+    }
+    #[inline(always)]
     fn select(mask: R::Mask, yes: Self, no: Self) -> Self {
         let mut result = Self::given(R::select(mask, yes.value, no.value));
         for i in 0..P {

@@ -13,7 +13,7 @@ pub fn dot<N: Number>(a: [N; 3], b: [N::Real; 3]) -> N {
 #[inline(always)]
 pub fn chord_squared<N: Number>(a: [N; 3], b: [N::Real; 3]) -> N {
     let d: [N; 3] = array!(|i| a[i] - N::constant(b[i]));
-    d[2].mul_add(d[2], d[1].mul_add(d[1], d[0] * d[0]))
+    d[2].square_add(d[1].square_add(d[0].squared()))
 }
 
 #[inline(always)]

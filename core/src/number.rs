@@ -73,6 +73,12 @@ pub trait Number:
     fn squared(self) -> Self {
         self * self
     }
+
+    /// self² + addend.
+    #[inline(always)]
+    fn square_add(self, addend: Self) -> Self {
+        self.mul_add(self, addend)
+    }
 }
 
 /// A number without derivatives, which can be compared.
