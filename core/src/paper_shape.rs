@@ -4,6 +4,7 @@
 //! of the normal out of that plane.
 
 use crate::dual::Steered;
+use crate::fresnel::fresnel_slope;
 use crate::geometry::{Illumination, dot, normalise};
 use crate::lanes::{Isa, LANES, Lane, LaneMask, outlined};
 use crate::minimise::{Objective, Outcome, Quadratic, Queue, minimise_all};
@@ -112,11 +113,56 @@ impl<const ISA: Isa> Left<ISA> {
     }
 }
 
-/// The fit of the shape: what it is for all pixels, under distant lights and a view that they share.
+/// A light in the arm's plane, XZ, with sine and cosine of half its tilt θa.
+#[derive(Clone, Copy)]
+struct ArmLight<const ISA: Isa> {
+    light: [Lane<ISA>; 3],
+    half_tilt: (Lane<ISA>, Lane<ISA>),
+}
+
+impl<const ISA: Isa> ArmLight<ISA> {
+    fn new(light: [Lane<ISA>; 3]) -> Self {
+        let half: Lane<ISA> = Lane(array!(|i| 0.5 * light[0].0[i].atan2(light[2].0[i])));
+        ArmLight { light, half_tilt: (Lane(array!(|i| half.0[i].sin())), Lane(array!(|i| half.0[i].cos()))) }
+    }
+
+    /// What `Illumination::new` makes of a view that is in the plane too and turns with the first parameter; `half_view` are
+    /// sine and cosine of θv / 2. The half vector's tilt is (θa + θv) / 2, and l · h the cosine of (θa − θv) / 2: they take
+    /// neither a root nor a division, nor do their slopes.
+    #[inline(always)]
+    fn seen_from(
+        &self,
+        view: [Steered<Lane<ISA>, 3>; 3],
+        half_view: (Lane<ISA>, Lane<ISA>),
+        index: f64,
+    ) -> Illumination<Steered<Lane<ISA>, 3>> {
+        let half = Lane::splat(0.5);
+        let ((sin_a, cos_a), (sin_v, cos_v)) = (self.half_tilt, half_view);
+        let (sine, cosine) = (sin_a.mul_add(cos_v, cos_a * sin_v), cos_a.mul_add(cos_v, -(sin_a * sin_v)));
+        let light_half = cos_a.mul_add(cos_v, sin_a * sin_v);
+        let slope = half * sin_a.mul_add(cos_v, -(cos_a * sin_v));
+        let inverse = Lane::splat(1.0) / light_half;
+        let (reflectance, reflectance_slope) = fresnel_slope(light_half, index);
+        Illumination {
+            light: array!(|i| Steered::given(self.light[i])),
+            view,
+            half: [
+                Steered::parameter(sine, 0, half * cosine),
+                Steered::given(Lane::splat(0.0)),
+                Steered::parameter(cosine, 0, -(half * sine)),
+            ],
+            per_light_half: Steered::parameter(inverse, 0, -(slope * inverse * inverse)),
+            facet_reflectance: Steered::parameter(reflectance, 0, slope * reflectance_slope),
+        }
+    }
+}
+
+/// The fit of the shape: what it is for all pixels, under distant lights in the plane XZ and a view that they share.
 pub struct ShapeFit<M, const ISA: Isa> {
     illuminations: Vec<Illumination<Lane<ISA>>>,
     /// The same for the view's θv at φv = 0.
     in_plane: Vec<Illumination<Lane<ISA>>>,
+    arm: Vec<ArmLight<ISA>>,
     specular: Lane<ISA>,
     optics: Optics,
     /// θv and φv as calibrated.
@@ -141,6 +187,7 @@ impl<M: Model, const ISA: Isa> ShapeFit<M, ISA> {
         ShapeFit {
             illuminations: illuminations.to_vec(),
             in_plane: illuminations.iter().map(|at| Illumination::new(at.light, in_plane, optics.index)).collect(),
+            arm: illuminations.iter().map(|at| ArmLight::new(at.light)).collect(),
             specular,
             optics,
             view: (theta, phi),
@@ -170,11 +217,16 @@ impl<M: Model, const ISA: Isa> ShapeFit<M, ISA> {
         tilts: [Lane<ISA>; PHI_STARTS.len()],
     ) -> (Lane<ISA>, Lane<ISA>) {
         let normals: [_; PHI_STARTS.len()] = array!(|i| left.normal(tilts[i]));
+        let mut shapes = [Lane::splat(0.0); MAX_STARTS];
+        for (lane, shape) in shapes.iter_mut().zip(M::STARTS) {
+            *lane = Lane::splat(shape[0]);
+        }
+        let shapes = &shapes[..M::STARTS.len()];
         let mut costs = [[Lane::splat(0.0); MAX_STARTS]; PHI_STARTS.len()];
         for (remainder, at) in left.remainders.iter().zip(illuminations) {
             for (normal, costs) in normals.iter().zip(&mut costs) {
-                for (cost, shape) in costs.iter_mut().zip(M::STARTS) {
-                    let lobe = M::basis(*normal, &[Lane::splat(shape[0])], at, &self.optics).specular[0];
+                for (cost, shape) in costs.iter_mut().zip(shapes) {
+                    let lobe = M::basis(*normal, std::slice::from_ref(shape), at, &self.optics).specular[0];
                     let residual = remainder.value - self.specular * lobe;
                     *cost = (remainder.weight * residual).mul_add(residual, *cost);
                 }
@@ -226,19 +278,25 @@ impl<M: Model, const ISA: Isa> ShapeFit<M, ISA> {
 
         let mut quadratic = Quadratic::zero();
         quadratic.cost = left.constant;
-        for (remainder, calibrated) in left.remainders.iter().zip(&self.illuminations) {
-            let light = array!(|i| Steered::given(calibrated.light[i]));
-            let at = Illumination::new(light, view, self.optics.index);
+        let half_view = sine_cosine(point.view * Lane::splat(0.5));
+        for (remainder, light) in left.remainders.iter().zip(&self.arm) {
+            let at = light.seen_from(view, half_view, self.optics.index);
             let lobe = M::basis(normal, &[shape], &at, &self.optics).specular[0];
-            let slopes = lobe.derivative;
             let residual = remainder.value - self.specular * lobe.value;
             quadratic.cost = (remainder.weight * residual).mul_add(residual, quadratic.cost);
             for p in 0..3 {
-                let weighted = remainder.weight * self.specular * slopes[p];
+                let weighted = remainder.weight * lobe.derivative[p];
                 quadratic.descent[p] = weighted.mul_add(residual, quadratic.descent[p]);
                 for q in p..3 {
-                    quadratic.hessian[p][q] = (weighted * self.specular).mul_add(slopes[q], quadratic.hessian[p][q]);
+                    quadratic.hessian[p][q] = weighted.mul_add(lobe.derivative[q], quadratic.hessian[p][q]);
                 }
+            }
+        }
+        // The residual's slopes are As times the lobe's.
+        for p in 0..3 {
+            quadratic.descent[p] = self.specular * quadratic.descent[p];
+            for q in p..3 {
+                quadratic.hessian[p][q] = self.specular * self.specular * quadratic.hessian[p][q];
             }
         }
         quadratic
@@ -388,6 +446,35 @@ impl<M: Model, const ISA: Isa> Objective<ISA, 3> for ShapeQueue<'_, M, ISA> {
             view: Lane::select(mask, yes.view, no.view),
             shape_log: Lane::select(mask, yes.shape_log, no.shape_log),
             phi: Lane::select(mask, yes.phi, no.phi),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::PLAIN;
+
+    #[test]
+    fn in_the_arms_plane_half_vector_and_reflectance_are_those_of_the_general_form() {
+        for (light_tilt, view_tilt) in [(-1.4f32, 0.1f32), (-0.3, -0.2), (0.25, 0.25), (0.9, 0.0), (1.5, -0.35)] {
+            let lane = |value: f32| Lane::<PLAIN>([value; LANES]);
+            let light = [lane(light_tilt.sin()), lane(0.0), lane(light_tilt.cos())];
+            let (sine, cosine) = (lane(view_tilt.sin()), lane(view_tilt.cos()));
+            let view: [Steered<_, 3>; 3] =
+                [Steered::parameter(sine, 0, cosine), Steered::splat(0.0), Steered::parameter(cosine, 0, -sine)];
+            let general = Illumination::new(array!(|i| Steered::given(light[i])), view, 1.5);
+            let half_view = (lane((view_tilt / 2.0).sin()), lane((view_tilt / 2.0).cos()));
+            let got = ArmLight::new(light).seen_from(view, half_view, 1.5);
+            let numbers = |at: &Illumination<Steered<Lane<PLAIN>, 3>>| {
+                [at.half[0], at.half[1], at.half[2], at.per_light_half, at.facet_reflectance]
+            };
+            for (got, want) in numbers(&got).iter().zip(numbers(&general)) {
+                let pairs = [(got.value, want.value), (got.derivative[0], want.derivative[0])];
+                for (got, want) in pairs.map(|(got, want)| (got.0[0], want.0[0])) {
+                    assert!((got - want).abs() < 3e-6 * want.abs().max(1.0), "{got}, want {want}");
+                }
+            }
         }
     }
 }
