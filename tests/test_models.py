@@ -309,3 +309,9 @@ def test_positive_where_lit_and_zero_where_dark(model):
         light = unit([[1.0, 0.0, grazing]])
         values = basis(model, typical, [0.0, 0.0, 1.0], light, unit([-1.0, 0.0, grazing]))
         assert all(np.isfinite(each).all() for each in values)
+
+
+def test_arrays_in_fortrans_order_are_refused():
+    codes = np.asfortranarray(np.zeros((4, 5, 3), np.uint16))
+    with pytest.raises(ValueError, match=r"\[4, 5, 3\] is not C-contiguous"):
+        _core.correct(codes, row0=0, height=4, clip=65535)

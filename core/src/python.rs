@@ -12,9 +12,10 @@ use crate::render::{Parameters, Scene};
 use crate::residual::{Codes, LeftOver, Residual};
 use crate::robust::Loss;
 use crate::slopes;
+use numpy::ndarray::Dimension;
 use numpy::{
-    IntoPyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray1,
-    PyUntypedArrayMethods,
+    Element, IntoPyArray, PyArrayMethods, PyReadonlyArray, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+    PyReadwriteArray1, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -22,6 +23,20 @@ use pyo3::types::PyDict;
 
 fn invalid(message: impl Into<String>) -> PyErr {
     PyValueError::new_err(message.into())
+}
+
+/// The values of an array in C's order. `as_slice` of the crate `numpy` takes Fortran's order as well, without a word.
+trait InOrder<T> {
+    fn values(&self) -> PyResult<&[T]>;
+}
+
+impl<T: Element, D: Dimension> InOrder<T> for PyReadonlyArray<'_, T, D> {
+    fn values(&self) -> PyResult<&[T]> {
+        if !self.is_c_contiguous() {
+            return Err(invalid(format!("an array of shape {:?} is not C-contiguous", self.shape())));
+        }
+        Ok(self.as_slice()?)
+    }
 }
 
 /// A model's name taken apart: "phong-no-ambient" is ("phong", false).
@@ -97,8 +112,8 @@ enum Photographs<'py> {
 impl Photographs<'_> {
     fn parse(&self) -> PyResult<(Samples<'_>, [usize; 3])> {
         let (samples, shape) = match self {
-            Photographs::U16(array) => (Samples::U16(array.as_slice()?), array.as_array().dim()),
-            Photographs::F32(array) => (Samples::F32(array.as_slice()?), array.as_array().dim()),
+            Photographs::U16(array) => (Samples::U16(array.values()?), array.as_array().dim()),
+            Photographs::F32(array) => (Samples::F32(array.values()?), array.as_array().dim()),
         };
         let (lights, pixels, channels) = shape;
         if !(1..=dispatch::MAX_CHANNELS).contains(&channels) {
@@ -211,19 +226,19 @@ fn fit<'py>(
         lights: places,
         intensity,
         camera: parse_camera(view_direction, camera_distance_mm),
-        position_mm: position_mm.as_ref().map(|array| array.as_slice()).transpose()?,
+        position_mm: position_mm.as_ref().map(|array| array.values()).transpose()?,
         clip_level: clip_level.iter().map(|&x| x as f32).collect(),
         shadow_level,
-        sample_mask: sample_mask.as_ref().map(|array| array.as_slice()).transpose()?,
+        sample_mask: sample_mask.as_ref().map(|array| array.values()).transpose()?,
         noise: Noise { read: noise.0, photon: noise.1, relative: noise.2 },
-        normal: normal.as_ref().map(|array| array.as_slice()).transpose()?,
+        normal: normal.as_ref().map(|array| array.values()).transpose()?,
         belief: match &belief {
             None => None,
             Some([normal, shape, mean, deviation]) => Some(Belief {
-                normal: normal.as_slice()?,
-                shape: shape.as_slice()?,
-                mean: mean.as_slice()?,
-                deviation: deviation.as_slice()?,
+                normal: normal.values()?,
+                shape: shape.values()?,
+                mean: mean.values()?,
+                deviation: deviation.values()?,
             }),
         },
     };
@@ -293,13 +308,13 @@ impl SceneItems<'_> {
         let entry = dispatch::entries().into_iter().find(|entry| entry.name == name).expect("parsed from this list");
         let parameters = Parameters {
             pixels: self.normal.as_array().nrows(),
-            normal: self.normal.as_slice()?,
-            diffuse: self.diffuse.as_slice()?,
-            specular: self.specular.as_slice()?,
-            shape: self.shape.as_slice()?,
-            ambient: self.ambient.as_ref().map_or(Ok(&[][..]), |array| array.as_slice())?,
-            specular_rgb: self.specular_rgb.as_ref().map_or(Ok(&[][..]), |array| array.as_slice())?,
-            view_tilt: self.view_tilt.as_ref().map_or(Ok(&[][..]), |array| array.as_slice())?,
+            normal: self.normal.values()?,
+            diffuse: self.diffuse.values()?,
+            specular: self.specular.values()?,
+            shape: self.shape.values()?,
+            ambient: self.ambient.as_ref().map_or(Ok(&[][..]), |array| array.values())?,
+            specular_rgb: self.specular_rgb.as_ref().map_or(Ok(&[][..]), |array| array.values())?,
+            view_tilt: self.view_tilt.as_ref().map_or(Ok(&[][..]), |array| array.values())?,
         };
         let scene = Scene {
             parameters,
@@ -308,7 +323,7 @@ impl SceneItems<'_> {
             intensity: self.light_intensity.as_array().iter().map(|&x| x as f32).collect(),
             camera: parse_camera(self.view_direction, self.camera_distance_mm),
             colour: self.light_rgb.clone(),
-            position_mm: self.position_mm.as_ref().map(|array| array.as_slice()).transpose()?,
+            position_mm: self.position_mm.as_ref().map(|array| array.values()).transpose()?,
             optics: parse_optics(self.index, &self.fresnel)?,
         };
         let (pixels, channels) = (parameters.pixels, scene.channels);
@@ -355,10 +370,10 @@ enum CodeItems<'py> {
 impl ResidualItems<'_> {
     fn parse(&self, scene: &Scene) -> PyResult<Residual<'_>> {
         let codes = match (&self.codes, &self.table) {
-            (CodeItems::U16(codes), None) => Codes::U16(codes.as_slice()?),
+            (CodeItems::U16(codes), None) => Codes::U16(codes.values()?),
             (CodeItems::U8(codes), Some(table)) => {
                 check("table", table.len(), 256)?;
-                Codes::U8(codes.as_slice()?, table.as_slice()?)
+                Codes::U8(codes.values()?, table.values()?)
             }
             _ => return Err(invalid("codes must be uint16, or uint8 with a table")),
         };
@@ -373,8 +388,8 @@ impl ResidualItems<'_> {
         Ok(Residual {
             codes,
             components,
-            basis: self.basis.as_slice()?,
-            strength: self.strength.as_slice()?,
+            basis: self.basis.values()?,
+            strength: self.strength.values()?,
             toe: self.toe,
         })
     }
@@ -428,7 +443,7 @@ fn left_over<'py>(
     };
     check("encoder", encoder.len(), encoder.shape()[0] * lights * channels)?;
     let components = encoder.shape()[0];
-    let encoder = encoder.as_slice()?;
+    let encoder = encoder.values()?;
     let codes = py.detach(|| dispatch::codes(name, &found, encoder)).expect("parsed from the list");
     Ok(codes.into_pyarray(py).reshape([pixels, components])?.into_any())
 }
@@ -505,12 +520,11 @@ fn basis_slopes<'py>(
     check("normal", normal.len(), 3 * pixels)?;
     check("shape", shape.len(), entry.shape.len() * pixels)?;
     let camera = parse_camera(view_direction, camera_distance_mm);
-    let position_mm = position_mm.as_ref().map(|array| array.as_slice()).transpose()?;
+    let position_mm = position_mm.as_ref().map(|array| array.values()).transpose()?;
     if camera.near() || lights.iter().any(Place::near) {
         check("position_mm", position_mm.map_or(0, <[f32]>::len), 2 * pixels)?;
     }
-    let view =
-        slopes::View { normal: normal.as_slice()?, shape: shape.as_slice()?, lights: &lights, camera, position_mm };
+    let view = slopes::View { normal: normal.values()?, shape: shape.values()?, lights: &lights, camera, position_mm };
     let slopes = py.detach(|| dispatch::basis_slopes(name, &view, &optics)).expect("parsed from this list");
     let shape = [pixels, lights.len(), 1 + entry.lobes, 3 + entry.shape.len()];
     Ok(slopes.into_pyarray(py).reshape(shape)?.into_any())
@@ -533,7 +547,7 @@ fn correct<'py>(
     per_step: Option<f32>,
 ) -> PyResult<(Bound<'py, PyAny>, usize)> {
     let &[rows, width, channels] = codes.shape() else { unreachable!("three dimensions") };
-    let table = table.as_ref().map(|table| Ok::<_, PyErr>((table.shape()[0], table.as_slice()?))).transpose()?;
+    let table = table.as_ref().map(|table| Ok::<_, PyErr>((table.shape()[0], table.values()?))).transpose()?;
     if let Some((found, values)) = table {
         check("table", found, channels)?;
         if values.is_empty() {
@@ -557,7 +571,7 @@ fn correct<'py>(
         dark: dark.as_ref().map(parse_grid).transpose()?,
         gain: gain.as_ref().map(parse_grid).transpose()?,
     };
-    let codes = codes.as_slice()?;
+    let codes = codes.values()?;
     fn run<T: Stored + Send + Sync>(
         py: Python<'_>,
         codes: &[u16],
@@ -586,13 +600,13 @@ fn correct<'py>(
 }
 
 fn parse_grid<'a>(grid: &'a PyReadonlyArray3<'_, f32>) -> PyResult<Grid<'a>> {
-    Ok(Grid { values: grid.as_slice()?, rows: grid.shape()[0], columns: grid.shape()[1] })
+    Ok(Grid { values: grid.values()?, rows: grid.shape()[0], columns: grid.shape()[1] })
 }
 
 /// Compresses bytes by zstd, with a checksum; see `impasto.store.zstd`.
 #[pyfunction]
 fn zstd_encode<'py>(py: Python<'py>, data: PyReadonlyArray1<'py, u8>, level: i32) -> PyResult<Bound<'py, PyAny>> {
-    let data = data.as_slice()?;
+    let data = data.values()?;
     let frame = py.detach(|| codec::compress(data, level))?;
     Ok(frame.into_pyarray(py).into_any())
 }
