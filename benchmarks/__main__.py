@@ -172,7 +172,7 @@ def main() -> int:
         choices=["accuracy", "speed", "procedures", "angles", "whole", "raw", "viewer"],
         help="one section; prints, writes nothing",
     )
-    parser.add_argument("--folder", type=Path, help="where to put the photographs and stores (about 12 GB)")
+    parser.add_argument("--folder", type=Path, help="where to put the photographs and stores (about 14 GB)")
     arguments = parser.parse_args()
     share = 10 if arguments.quick else 1
     with tempfile.TemporaryDirectory(dir=arguments.folder) as name:

@@ -15,11 +15,15 @@ from pathlib import Path
 import numpy as np
 from benchmarks.photographs import write_capture
 from benchmarks.problem import LIGHTS, MODEL, light_directions
+from benchmarks.whole import wake_memory
 
 import impasto
 from impasto.fit import PROCEDURES, FitOptions
 from impasto.models import parse_model
 from impasto.store import STACK_CHUNK, Stack, open_stack
+
+# Of the process, and of the maps that it writes.
+_MEMORY = 2 << 30
 
 
 def arm_directions() -> np.ndarray:
@@ -40,6 +44,7 @@ def measure(folder: Path, side_px: int) -> dict[str, dict[str, float]]:
         store = folder / f"{procedure}.zarr"
         impasto.stack(capture.folder, store, show_progress=False)
         command = [sys.executable, "-m", "benchmarks.procedures", str(store), procedure]
+        wake_memory(_MEMORY)
         environment = os.environ | {"RAYON_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         done = subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
         speeds[procedure] = json.loads(done.stdout)
