@@ -2,6 +2,7 @@
 
 import json
 
+import google_crc32c
 import numpy as np
 import pytest
 import zarr
@@ -102,6 +103,18 @@ def test_a_flipped_byte_is_found(tmp_path, position):
     data[position] ^= 4
     shard.write_bytes(bytes(data))
     with pytest.raises((OSError, RuntimeError, ValueError)):
+        open_array(tmp_path, f"{GROUP}/diffuse").read()
+
+
+@pytest.mark.parametrize("outside", [(2**63, 10), (2**64 - 2, 10), (0, 2**40), (0, 2**64 - 2), (10**9, 10)])
+def test_an_index_that_points_outside_of_its_file_is_found(tmp_path, outside):
+    written(tmp_path)
+    shard = tmp_path / GROUP / "diffuse" / "c" / "1" / "0" / "0"
+    data = bytearray(shard.read_bytes())
+    data[-260:-244] = np.array(outside, "<u8").tobytes()
+    data[-4:] = google_crc32c.value(bytes(data[-260:-4])).to_bytes(4, "little")
+    shard.write_bytes(bytes(data))
+    with pytest.raises(ValueError, match="the file has"):
         open_array(tmp_path, f"{GROUP}/diffuse").read()
 
 

@@ -6,6 +6,7 @@ codecs there are for it, twice the time for a tile of a stack. Of Zarr this know
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -25,6 +26,9 @@ Region = tuple[slice, ...]
 
 # How a chunk is made of values, and how it is compressed.
 _ENCODINGS = {("bytes", "zstd"), ("bytes", "gzip"), ("vlen-utf8", "zstd"), ("vlen-utf8", "gzip")}
+
+# Strings are names of files; more bytes for each, on average, are damage.
+_STRING_BYTES = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -169,9 +173,11 @@ class ArrayReader:
 
     def _values(self, data: bytes) -> NDArray[Any]:
         values, compressor = self._encoding
-        decoded = decompress(data, compressor)
+        count = math.prod(self._chunk)
         if values == "vlen-utf8":
+            decoded = decompress(data, compressor, count * _STRING_BYTES)
             return np.array(strings_decode(bytes(decoded)), object).reshape(self._chunk)
+        decoded = decompress(data, compressor, count * self.dtype.itemsize)
         return np.frombuffer(decoded, self.dtype.newbyteorder("<")).reshape(self._chunk)
 
 

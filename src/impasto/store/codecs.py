@@ -30,24 +30,30 @@ def zstd_decode(frame: bytes, out: NDArray[Any]) -> None:
     _core.zstd_decode(frame, out.reshape(-1).view(np.uint8))
 
 
-def decompress(data: bytes, compressor: str) -> bytes | Bytes:
-    """Return what data hold that ``zstd`` or ``gzip`` compressed.
+def decompress(data: bytes, compressor: str, limit: int) -> bytes | Bytes:
+    """Return what data hold that ``zstd`` or ``gzip`` compressed, at most `limit` bytes.
 
     Raises
     ------
-    OSError, ValueError
-        If they are damaged or cut off.
+    ValueError
+        If they are damaged, cut off, or hold more.
     """
     if compressor == "gzip":
-        import gzip
         import zlib
 
+        # One byte more has it read on to the checksum at the end.
+        stream = zlib.decompressobj(zlib.MAX_WBITS | 16)
         try:
-            return gzip.decompress(data)
-        except (EOFError, zlib.error) as error:
+            decoded = stream.decompress(data, limit + 1)
+        except zlib.error as error:
             raise ValueError(str(error)) from error
-    # Each byte of a frame stands for 131072 at most: a length beyond is damaged.
-    out = np.empty(min(_core.zstd_length(data), len(data) << 17), np.uint8)
+        if not stream.eof or len(decoded) > limit:
+            raise ValueError(f"a chunk that is cut off, or of more than {limit} bytes")
+        return decoded
+    length = _core.zstd_length(data)
+    if length > limit:
+        raise ValueError(f"a chunk of {length} bytes, expected {limit} at most")
+    out = np.empty(length, np.uint8)
     zstd_decode(data, out)
     return out
 

@@ -79,9 +79,19 @@ def read_index(file: int, grid: Sequence[int]) -> NDArray[np.uint64]:
 
 
 def chunk_in(file: int, index: NDArray[np.uint64], place: Place) -> bytes | None:
-    """Return the bytes of a chunk of an open shard, None where it has none."""
+    """Return the bytes of a chunk of an open shard, None where it has none.
+
+    Raises
+    ------
+    ValueError
+        If the index says that they lie beyond the end of the file.
+    """
     offset, size = index[place].tolist()
-    return None if offset == _NONE else os.pread(file, size, offset)
+    if offset == _NONE:
+        return None
+    if offset + size > (end := os.fstat(file).st_size):
+        raise ValueError(f"a chunk of {size} bytes at byte {offset}, and the file has {end}")
+    return os.pread(file, size, offset)
 
 
 def _checksum(data: bytes) -> bytes:
