@@ -9,11 +9,12 @@ import zarr
 from zarr.codecs import ZstdCodec
 
 from impasto import store as stores
+from impasto.errors import StoreError
 from impasto.stack import stack
 from impasto.store.chunks import encode_chunks
 from impasto.store.hierarchy import open_array
 from impasto.store.layout import Map, fit_maps
-from store_files import chunks_in, noise_images, write_capture
+from store_files import chunks_in, largest_file, noise_images, write_capture
 
 STATUS = Map("status", None, 1, "1", "how it ended", dtype="uint8")
 DIFFUSE = Map("diffuse", "channel", 3, "1", "diffuse magnitude")
@@ -116,6 +117,17 @@ def test_an_index_that_points_outside_of_its_file_is_found(tmp_path, outside):
     shard.write_bytes(bytes(data))
     with pytest.raises(ValueError, match="the file has"):
         open_array(tmp_path, f"{GROUP}/diffuse").read()
+
+
+def test_a_full_disk_is_told_as_one_where_another_map_waits_to_be_written(tmp_path):
+    # The first map fails at once; the second, of a few bytes, when its file is closed.
+    writer = stores.MapsWriter(tmp_path, GROUP, (DIFFUSE, STATUS), 300, 300, {})
+    noise = np.random.default_rng(1).random((300, 300, 3), np.float32)
+    (unit,) = stores.units(300, 300)
+    with largest_file(0), pytest.raises(StoreError, match="diffuse: there is no room"):
+        writer.write(unit, {"diffuse": noise, "status": np.zeros((300, 300), np.uint8)})
+    assert not list(tmp_path.rglob("*.partial"))
+    assert writer.unfinished() == [unit]
 
 
 def test_only_chunks_with_pixels_are_in_a_shard(tmp_path):

@@ -216,8 +216,8 @@ class _OpenUnit:
         return writing(self._writer.store, what)
 
     def discard(self) -> None:
-        """Remove what was written."""
-        with suppress(_Discarded), self._files:
+        """Remove what was written; that a full disk does not take the rest of it is no error any more."""
+        with suppress(_Discarded, OSError), self._files:
             raise _Discarded
 
 
