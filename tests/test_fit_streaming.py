@@ -279,6 +279,17 @@ def test_damage_of_the_stack_names_the_photograph(stacked, tmp_path, first_sampl
         fit(path, models=["lambert"])
 
 
+def test_every_lost_photograph_is_named(small, first_samples):
+    photograph(small, 0).unlink()
+    photograph(small, 6).unlink()
+    with pytest.raises(StoreError) as caught:
+        fit(small, models=["lambert"])
+    assert [problem.what for problem in caught.value.problems] == [
+        "light00 has lost pixels",
+        "light06 has lost pixels",
+    ]
+
+
 def test_everything_wrong_with_the_options_is_said_at_once(small):
     options = FitOptions(fresnel="facett", loss="squared", exclude=("light99",), index=0.5, max_steps=0)
     with pytest.raises(ImpastoError) as caught:

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from impasto.errors import Problem, StoreError, raise_problems
 from impasto.fit.procedure import Procedure
 from impasto.store import STACK_CHUNK, Maps, Stack, Tile, Unit
 
-# A tile of the stack, all lights. With one tile read ahead, a few fitted ones waiting, and a block of maps
-# per level, the whole process stays under 1 GB, whatever the size and number of the photographs. Not an
+# A tile of the stack, all lights. With one tile read ahead, a fitted one waiting, and a block of maps per
+# level, the whole process stays under 1 GB, whatever the size and number of the photographs. Not an
 # option, because the result must not depend on it.
 _TILE_BYTES = 64 << 20
 
@@ -139,10 +140,20 @@ def read_tiles(
         for number, (piece, tile) in enumerate(tiles):
             assert coming is not None
             values, parts = coming
-            for part in parts:
-                part.result()
+            _wait(parts)
             coming = read(number + 1, pool) if number + 1 < len(tiles) else None
             yield piece, tile.rows, tile.columns, values
+
+
+def _wait(parts: Sequence[Future[Any]]) -> None:
+    """Wait for the parts of a tile; raise what is wrong with all of them together."""
+    problems: list[Problem] = []
+    for part in parts:
+        try:
+            part.result()
+        except StoreError as error:
+            problems += error.problems
+    raise_problems(StoreError, dict.fromkeys(problems))
 
 
 def _tile_rows(pixel_bytes: int) -> int:
