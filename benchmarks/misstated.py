@@ -33,9 +33,7 @@ SCENES = ((0, 1), (0, 2), (1, 3))
 Array = NDArray[np.float64]
 
 
-def measure(
-    measured: Path, folder: Path, painting: int, errors: int, size: tuple[int, int]
-) -> dict[str, float]:
+def measure(measured: Path, folder: Path, painting: int, errors: int) -> dict[str, float]:
     """Simulate a scene in `folder` and return the figures of it."""
     photos, store = folder / "photos", folder / "painting.zarr"
     impasto.simulate(photos, dome=True, lights=LIGHTS, size=SIZE, seed=painting, measured=measured)

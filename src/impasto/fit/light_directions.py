@@ -36,11 +36,12 @@ _DIRECTION_SD = np.radians(1.41)
 _STRENGTH_SD = 0.5
 
 # Of what all pixels share and the model does not know, per function: depending on the zenith angle alone, as
-# the fall-off of an unknown material does on a flat painting, or on the whole direction.
+# the fall-off of an unknown material does on a flat painting, or, of strengths, on the whole direction. A
+# material that is the same from all sides seems to turn lights up or down, never around.
 _ZENITH_LENGTH = np.radians(15.0)
 _SHARED_LENGTH = 0.7
 _STRENGTH_SHARED_SD = (0.3, 0.1)
-_DIRECTION_SHARED_SD = (0.05, 0.01)
+_DIRECTION_SHARED_SD = 0.05
 
 # Of what a single pixel leaves over, in the logarithm: a smooth function of direction, and noise. A factor on
 # all of it is each pixel's own, because a model meets one paint closer than another; no pixel is trusted
@@ -137,12 +138,10 @@ def _priors(direction: Array) -> tuple[Array, Array]:
     along_zenith = np.exp(-np.square((zenith[:, None] - zenith) / _ZENITH_LENGTH) / 2)
     anywhere = kernel(direction, direction, _SHARED_LENGTH)
     zonal, whole = np.square(_STRENGTH_SHARED_SD)
-    zonal_turn, whole_turn = np.square(_DIRECTION_SHARED_SD)
     shared, prior = np.zeros((2, 3, count, 3, count))
     # The overall strength means nothing.
     shared[0, :, 0] = zonal * along_zenith + whole * anywhere + 1.0
-    shared[1, :, 1] = zonal_turn * along_zenith + whole_turn * anywhere
-    shared[2, :, 2] = whole_turn * anywhere
+    shared[1, :, 1] = _DIRECTION_SHARED_SD**2 * along_zenith
     for place, sd in enumerate((_STRENGTH_SD, _DIRECTION_SD, _DIRECTION_SD)):
         prior[place, :, place] = shared[place, :, place] + sd**2 * np.eye(count)
     return prior.reshape(3 * count, -1), shared.reshape(3 * count, -1)
