@@ -26,6 +26,15 @@ def flat(text):
     return " ".join(text.split())
 
 
+def test_an_interruption_while_a_command_is_loaded_ends_without_a_traceback():
+    script = (
+        "import sys, impasto.cli as cli; sys.argv = ['impasto', 'fit']; "
+        "cli.import_module = lambda _: (_ for _ in ()).throw(KeyboardInterrupt); cli.main()"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "")
+
+
 def test_help_comes_fast():
     """Others call the program in loops, and nobody waits for help."""
     script = "import sys; from impasto.cli import main; sys.argv = ['impasto', '--help']; main()"

@@ -42,13 +42,15 @@ _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 def main() -> None:
     """Run the command line."""
     _spare_the_system()
-    # All subcommands take a while to load; the one that is called is enough.
-    called = next(iter(sys.argv[1:]), "")
-    import_module(f"{__name__}.{called if called in COMMANDS else 'commands'}")
-    from impasto.cli.app import app
-
     try:
+        # All subcommands take a while to load; the one that is called is enough.
+        called = next(iter(sys.argv[1:]), "")
+        import_module(f"{__name__}.{called if called in COMMANDS else 'commands'}")
+        from impasto.cli.app import app
+
         app()
+    except KeyboardInterrupt:
+        sys.exit(130)  # before the command began, which would say more
     finally:
         # Python looks three times for rubbish before it ends, and everything ends with it. OpenImageIO alone
         # would take what it does not find for leaks, and list them.
