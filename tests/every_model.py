@@ -50,7 +50,7 @@ def write_every_model(folder, width, height):
         if spec.ambient:
             *others, status = maps
             maps = (*others, residual_map(COMPONENTS), status)
-            attributes[RESIDUAL] = _random_residual(channels)
+            attributes[RESIDUAL] = _random_residual(channels, tabled=len(spec.shape) > 1)
         sizes = [(height, width), *level_sizes(height, width)]
         for level, size in enumerate(sizes):
             group = coarser_group(spec.name, level) if level else fit_group(spec.name)
@@ -61,8 +61,11 @@ def write_every_model(folder, width, height):
     return store
 
 
-def _random_residual(channels):
-    """Return functions of the light's direction, over lights up to 60°: others are outside of their hull."""
+def _random_residual(channels, tabled):
+    """Return functions of the light's direction, over lights up to 60°: others are outside of their hull.
+
+    Strengths are told by a table, or as stores had it before there were tables.
+    """
     rng = np.random.default_rng(SEED)
     direction = dome_direction(np.arccos(rng.uniform(0.5, 1, 24)), rng.uniform(0, 2 * np.pi, 24))
     return {
@@ -75,7 +78,9 @@ def _random_residual(channels):
         "weights": rng.normal(0, 0.02, (COMPONENTS, channels, 24)).tolist(),
         "hull": hull_of(direction).tolist(),
         "fade": 0.17,
-        "strength": {"length": 0.5, "noise": 0.1, "weights": rng.normal(0, 0.1, (channels, 24)).tolist()},
+        "strength": {"table": rng.normal(0, 0.1, (channels, 7, 12)).tolist()}
+        if tabled
+        else {"length": 0.5, "noise": 0.1, "weights": rng.normal(0, 0.1, (channels, 24)).tolist()},
     }
 
 

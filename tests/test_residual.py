@@ -10,14 +10,15 @@ import pytest
 import zarr
 
 import impasto
+from impasto.direction_table import look_up, node_directions
 from impasto.errors import OptionError
 from impasto.fit import FitOptions
 from impasto.fit.light_process import LightProcess, compress, hull_of
 from impasto.fit.remainder import left_over
 from impasto.fit.strength import find_strength
-from impasto.geometry import Camera, Lights, arm_direction, dome_direction
+from impasto.geometry import Camera, Lights, arm_direction, dome_direction, zenith_azimuth
 from impasto.pixels import Pixels, near_positions_mm, render_pixels
-from impasto.residual import ZERO, ResidualTerm, encode, kernel
+from impasto.residual import ZERO, ResidualTerm, encode, kernel, told
 from impasto.store import open_fit, open_stack
 from store_files import write_capture
 
@@ -127,8 +128,11 @@ def test_the_term_fades_to_nothing_outside_the_hull():
         assert changed.any() != same
 
 
-def test_added_as_docs_store_md_says():
+@pytest.mark.parametrize("tabled", [True, False])
+def test_added_as_docs_store_md_says(tabled):
     direction = lights(12)
+    strength = RNG.normal(0.0, 0.2, size=(3, 12))
+    table = RNG.normal(0.0, 0.2, size=(3, 4, 6))
     found = {
         "components": 3,
         "step": [0.01, 0.02, 0.005],
@@ -138,7 +142,7 @@ def test_added_as_docs_store_md_says():
         "weights": (weights := RNG.normal(size=(3, 3, 12))).tolist(),
         "hull": hull_of(direction).tolist(),
         "fade": 0.17,
-        "strength": {"length": 0.6, "weights": (strength := RNG.normal(0.0, 0.2, size=(3, 12))).tolist()},
+        "strength": {"table": table.tolist()} if tabled else {"length": 0.6, "weights": strength.tolist()},
     }
     codes = RNG.integers(ZERO - 9, ZERO + 9, size=(7, 3)).astype(np.uint16)
     intensity = np.array([[1.0, 1.2, 0.8], [2.0, 2.0, 2.0]])
@@ -151,8 +155,14 @@ def test_added_as_docs_store_md_says():
         value = np.sqrt(diffuse[pixel, channel] * direction[which, 2] + 0.004) - np.sqrt(0.004)
         value += ((codes[pixel].astype(float) - ZERO) * found["step"]) @ (weights[:, channel] @ near)
         expected = ((max(value, 0) + np.sqrt(0.004)) ** 2 - 0.004) * intensity[which, channel]
-        around = np.exp(-np.square(direction[which] - direction).sum(axis=1) / (2 * 0.6**2))
-        expected *= np.exp(strength[channel] @ around)
+        if tabled:
+            around = np.append(table[channel], table[channel, :, :1], axis=1)
+            zenith, azimuth = np.degrees(zenith_azimuth(direction[which]))
+            row = [np.interp(azimuth % 360.0, np.arange(0, 361, 60), values) for values in around]
+            expected *= np.exp(np.interp(zenith, [0, 30, 60, 90], row))
+        else:
+            around = np.exp(-np.square(direction[which] - direction).sum(axis=1) / (2 * 0.6**2))
+            expected *= np.exp(strength[channel] @ around)
         np.testing.assert_allclose(got[place], expected, rtol=2e-4, atol=1e-5)
 
 
@@ -225,18 +235,45 @@ def test_strengths_that_are_smooth_over_direction_are_told_to_lights_between():
     def smooth(at):
         return 0.2 * np.sin(4.0 * at[:, :1] + [0.0, 0.3, 0.6]) * at[:, 1:2]
 
-    told = find_strength(direction, smooth(direction) + RNG.normal(0.0, 0.01, (60, 1)))
-    term = ResidualTerm.of({"residual": {**plain_term(direction), "strength": told}})
-    found = np.log(term.strength(between))
-    assert np.sqrt(np.square(found - smooth(between)).mean()) < 0.3 * smooth(between).std()
+    found = find_strength(direction, smooth(direction) + RNG.normal(0.0, 0.01, (60, 1)))
+    term = ResidualTerm.of({"residual": {**plain_term(direction), "strength": found}})
+    off = np.log(term.strength(between)) - smooth(between)
+    assert np.sqrt(np.square(off).mean()) < 0.3 * smooth(between).std()
     far = dome_direction(np.radians([88.0]), [1.0])
     assert term.strength(far) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("way", ["spokes", "rings"])
+def test_strengths_of_a_lamp_that_is_led_around_are_told_to_lights_between(way):
+    """Of 12 spokes of 6 lights, or of 6 rings, each a little stronger or weaker; every fourth is left out."""
+    rng = np.random.default_rng(3)
+    spoke, ring = (index.ravel() for index in np.meshgrid(np.arange(12), np.arange(6), indexing="ij"))
+    direction = dome_direction(np.radians(15.0 + 12.0 * ring), np.radians(30.0 * spoke))
+    drawn = 0.15 * rng.standard_normal(12)[spoke if way == "spokes" else ring][:, None]
+    left_out = (spoke + ring) % 4 == 0
+    found = find_strength(direction[~left_out], drawn[~left_out])
+    assert (found["azimuth"], found["zenith"]) == (way == "spokes", way == "rings")
+    off = told(found, direction[left_out], ()) - drawn[left_out]
+    assert np.sqrt(np.square(off).mean()) < 0.4 * drawn[left_out].std()
+
+
+def test_a_table_over_direction_keeps_what_is_smooth():
+    def smooth(at):
+        return np.stack([at[..., 0] * at[..., 1], np.sin(2.0 * at[..., 2] + at[..., 0])])
+
+    between = dome_direction(RNG.uniform(0.0, np.pi / 2, 300), RNG.uniform(-4.0, 7.0, 300))
+    nodes = node_directions()
+    np.testing.assert_allclose(look_up(smooth(nodes), between), smooth(between).T, atol=0.006)
+    exact = look_up(smooth(nodes), nodes.reshape(-1, 3))
+    np.testing.assert_allclose(exact, smooth(nodes).reshape(2, -1).T, atol=1e-9)
+    below = dome_direction(np.radians([90.0, 120.0]), [1.0, 1.0])
+    np.testing.assert_allclose(*look_up(smooth(nodes), below), atol=1e-12)
 
 
 def test_strengths_that_have_nothing_to_do_with_direction_are_not_told():
     rng = np.random.default_rng(11)
     draws = [find_strength(lights(40), rng.normal(0.0, 0.1, (40, 1)) + np.zeros(3)) for _ in range(50)]
-    assert sum(told is not None for told in draws) <= 2
+    assert sum(each is not None for each in draws) <= 2
 
 
 def test_even_lights_are_as_bright_as_stated():

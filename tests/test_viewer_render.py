@@ -109,20 +109,22 @@ def test_the_page_draws_what_the_core_renders(model, published, page):
     print(f"{model}: {np.mean(differences == 0):.6f} equal, {np.mean(differences <= 1):.6f} within 1")
 
 
-@pytest.mark.parametrize("scaled", [False, True])
-def test_lights_far_away_are_drawn_as_near_as_the_fit_found_its_own(scaled, published, browser, tmp_path):
-    """One distance in pixels, and one that is smooth over direction, in mm."""
+@pytest.mark.parametrize("way", ["one", "table", "kernel"])
+def test_lights_far_away_are_drawn_as_near_as_the_fit_found_its_own(way, published, browser, tmp_path):
+    """One distance in pixels, and one that is smooth over direction, in mm, as stores have and had it."""
     model = "torrance-sparrow"
     shutil.copytree(published, tmp_path / "site")
     root = tmp_path / "site" / "painting.zarr" / "zarr.json"
     document = json.loads(root.read_text())
     attributes = document["attributes"]
     told = {"distance": 1.2}
-    if scaled:
+    if way == "one":
+        attributes["camera"]["mm_per_px"] = None
+    elif way == "table":
+        told |= {"length": 0.6, "table": [[[0.1, 0.1, 0.1], [0.4, -0.2, 0.3], [0.2, 0.0, -0.3]]]}
+    else:
         directions = dome_direction(np.radians([30.0, 60.0, 60.0]), np.radians([0.0, 120.0, 240.0])).tolist()
         told |= {"direction": directions, "length": 0.5, "weights": [[0.3, -0.2, 0.4]]}
-    else:
-        attributes["camera"]["mm_per_px"] = None
     (entry,) = [entry for entry in attributes["models"] if entry["name"] == model]
     entry["self_calibration"] = {"distances": {"told": told}}
     root.write_text(json.dumps(document))

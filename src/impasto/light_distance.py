@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from impasto.geometry import Array, Camera, Lights
-from impasto.residual import kernel
+from impasto.residual import told
 
 
 def place_lights(
@@ -65,7 +65,7 @@ def _found(attributes: Mapping[str, Any]) -> Mapping[str, Any] | None:
 def _distance(found: Mapping[str, Any], direction: Array) -> Array:
     """Return the distances (L,) of lights in directions (L, 3), over the longer side of the painting."""
     logarithm = np.full(len(direction), np.log(found["distance"]))
-    if "weights" in found:
-        logarithm += kernel(direction, found["direction"], found["length"]) @ np.array(found["weights"][0])
+    if "table" in found or "weights" in found:
+        logarithm += told(found, direction, found.get("direction", []))[:, 0]
     result: Array = np.exp(logarithm)
     return result

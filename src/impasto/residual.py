@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from impasto.direction_table import look_up
 from impasto.geometry import Array, Lights
 
 Values = NDArray[np.float32]
@@ -45,6 +46,29 @@ def kernel(first: ArrayLike, second: ArrayLike, length: float) -> Array:
     return result
 
 
+def told(found: Mapping[str, Any], direction: ArrayLike, fitted: ArrayLike) -> Array:
+    """Return the logarithm of what the lights that were fitted tell of others, such as their strength.
+
+    Parameters
+    ----------
+    found : mapping
+        With a ``table`` over direction, or, of stores made before there were tables, the ``length`` of a
+        kernel and ``weights``.
+    direction : array_like of shape (L, 3)
+        Of the others.
+    fitted : array_like of shape (N, 3)
+        Directions that the weights belong to.
+
+    Returns
+    -------
+    ndarray of shape (L, C)
+    """
+    if "table" in found:
+        return look_up(np.array(found["table"], np.float64), np.asarray(direction, np.float64))
+    result: Array = kernel(direction, fitted, float(found["length"])) @ np.array(found["weights"]).T
+    return result
+
+
 @dataclass(frozen=True)
 class ResidualTerm:
     """The part of a residual that all pixels share: K functions of the light's direction.
@@ -66,10 +90,8 @@ class ResidualTerm:
         Sine of the angle over which the term fades outside of the hull.
     table : ndarray of shape (256,), float32, or None
         Of a published store, what stands for a code in place of its distance from `ZERO`.
-    strength_length : float
-        Length of the kernel of the strengths.
-    strength_weights : ndarray of shape (C, N) or None
-        Of the logarithm of how strong the lights around a direction were; None where that is not told.
+    strength_told : mapping or None
+        How strong the lights around a direction were, as `told` takes it; None where that is not told.
     """
 
     direction: Array
@@ -80,8 +102,7 @@ class ResidualTerm:
     hull: Array
     fade: float
     table: Values | None = None
-    strength_length: float = 1.0
-    strength_weights: Array | None = None
+    strength_told: Mapping[str, Any] | None = None
 
     @classmethod
     def of(cls, attributes: Mapping[str, Any]) -> ResidualTerm | None:
@@ -94,7 +115,6 @@ class ResidualTerm:
             return np.array(found[name], np.float64)
 
         published = "table" in found
-        strength = found.get("strength")
         return cls(
             direction=array("direction"),
             length=float(found["length"]),
@@ -104,8 +124,7 @@ class ResidualTerm:
             hull=array("hull"),
             fade=float(found["fade"]),
             table=array("table").astype(np.float32) if published else None,
-            strength_length=float(strength["length"]) if strength else 1.0,
-            strength_weights=np.array(strength["weights"], np.float64) if strength else None,
+            strength_told=found.get("strength"),
         )
 
     @property
@@ -128,10 +147,10 @@ class ResidualTerm:
 
     def strength(self, direction: ArrayLike) -> Array:
         """Return how strong the lights around directions (L, 3) were, with the fading, as (L, 1 or C)."""
-        if self.strength_weights is None:
+        if self.strength_told is None:
             return np.ones((len(np.asarray(direction)), 1))
-        told = kernel(direction, self.direction, self.strength_length) @ self.strength_weights.T
-        result: Array = np.exp(told * self.share(direction)[:, None])
+        logarithm = told(self.strength_told, direction, self.direction)
+        result: Array = np.exp(logarithm * self.share(direction)[:, None])
         return result
 
     def even(self, lights: Lights) -> Lights:

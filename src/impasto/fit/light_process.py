@@ -42,22 +42,32 @@ class LightProcess:
         return kernel(self.direction, self.direction, self.length) + self.noise * np.eye(len(self.direction))
 
     def left_out(self, moments: Array) -> Array:
-        """Return the mean square error at each light, predicted from all others, shape (L,).
+        """Return the mean square error at each light, predicted from all others; see `left_out`."""
+        return left_out(self.gram(), moments)
 
-        Parameters
-        ----------
-        moments : ndarray of shape (L, L)
-            Second moments of the samples over all pixels.
 
-        Notes
-        -----
-        Left out by one, a sample's error is [K⁻¹ r]ᵢ / [K⁻¹]ᵢᵢ ([Rasmussen2006]_, eq. 5.12), so that the mean
-        over pixels needs their second moments alone.
-        """
-        inverse = np.linalg.inv(self.gram())
-        square = np.einsum("il,lm,im->i", inverse, moments, inverse)
-        result: Array = square / np.diag(inverse) ** 2
-        return result
+def left_out(gram: Array, moments: Array) -> Array:
+    """Return the mean square error of a Gaussian process at each light, predicted from all others.
+
+    Parameters
+    ----------
+    gram : ndarray of shape (L, L)
+        Covariance of samples at the lights, with the noise.
+    moments : ndarray of shape (L, L)
+        Second moments of the samples over all pixels.
+
+    Returns
+    -------
+    ndarray of shape (L,)
+
+    Notes
+    -----
+    Left out by one, a sample's error is [K⁻¹ r]ᵢ / [K⁻¹]ᵢᵢ ([Rasmussen2006]_, eq. 5.12), so that the mean
+    over pixels needs their second moments alone.
+    """
+    inverse = np.linalg.inv(gram)
+    result: Array = ((inverse @ moments) * inverse).sum(axis=1) / np.diag(inverse) ** 2
+    return result
 
 
 def choose_process(direction: Array, moments: Array) -> LightProcess:

@@ -17,7 +17,6 @@ from impasto.fit.choice import WORTH_DB, choose
 from impasto.fit.light_directions import MIN_LIGHTS, correct_directions
 from impasto.fit.light_distances import find_distances
 from impasto.fit.light_evidence import least_radiance, log_ratio
-from impasto.fit.light_process import rounded
 from impasto.fit.strength import find_strength
 from impasto.fit.trend import find_trend
 from impasto.geometry import Array, Lights, degrees_between
@@ -189,7 +188,7 @@ def _told(direction: Array, distance: Array) -> dict[str, Any]:
     told = find_strength(direction, (logarithm - middle)[:, None]) if np.ptp(logarithm) else None
     return {
         "distance": float(f"{np.exp(middle):.7g}"),
-        **({"direction": rounded(direction), **told} if told else {}),
+        **(told or {}),
     }
 
 

@@ -1,9 +1,7 @@
 /** What a model leaves over, as the shader adds it: docs/store.md, "The residual term"; src/impasto/residual.py. */
 
 import type { ResidualTerm } from "../store/attributes";
-
-const dot = (a: readonly number[], b: readonly number[]) =>
-  a.reduce((sum, value, i) => sum + value * b[i]!, 0);
+import { dot, kernelSum, told } from "./told";
 
 /** Returns how much of the term is left at a light's direction. */
 function share(term: ResidualTerm, direction: readonly number[]): number {
@@ -12,43 +10,25 @@ function share(term: ResidualTerm, direction: readonly number[]): number {
   return 1 - part * part * (3 - 2 * part);
 }
 
-/** Returns the sum over lights n of weight n times exp(−|l − dₙ|² / 2ℓ²), of unit vectors l and dₙ. */
-export function kernelSum(
-  weights: readonly number[],
-  lights: readonly (readonly number[])[],
-  length: number,
-  direction: readonly number[],
-): number {
-  // For unit vectors |l − d|² = 2 − 2 l·d.
-  const kernel = lights.map((light) => Math.exp((Math.min(dot(light, direction), 1) - 1) / length ** 2));
-  return dot(weights, kernel);
-}
-
-/** Returns the same for each channel, over the lights of a term. */
-function series(
-  term: ResidualTerm,
-  channels: readonly (readonly number[])[],
-  length: number,
-  direction: readonly number[],
-): [number, number, number] {
-  const values = channels.map((weights) => kernelSum(weights, term.direction, length, direction));
-  return values.length === 3 ? [values[0]!, values[1]!, values[2]!] : [values[0]!, values[0]!, values[0]!];
-}
+const threeChannels = (values: readonly number[]) =>
+  values.length === 3 ? [...values] : [values[0]!, values[0]!, values[0]!];
 
 /** Returns the functions of a light's direction, with their fading: three channels for each component. */
 export function residualBasis(term: ResidualTerm, direction: readonly number[]): number[][] {
   const left = share(term, direction);
   return term.weights.map((channels) =>
-    series(term, channels, term.length, direction).map((value) => left * value),
+    threeChannels(
+      channels.map((weights) => left * kernelSum(weights, term.direction, term.length, direction)),
+    ),
   );
 }
 
 /** Returns how strong the lights around a direction were, in three channels. */
 export function residualStrength(term: ResidualTerm, direction: readonly number[]): number[] {
   if (!term.strength) return [1, 1, 1];
-  const { length, weights } = term.strength;
   const left = share(term, direction);
-  return series(term, weights, length, direction).map((value) => Math.exp(left * value));
+  const logarithms = threeChannels(told(term.strength, term.direction, direction));
+  return logarithms.map((value) => Math.exp(left * value));
 }
 
 /** Adds a term to the radiance per unit of irradiance in one channel. */

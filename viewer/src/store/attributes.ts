@@ -43,11 +43,9 @@ export interface ModelEntry {
 }
 
 /** How far away lights stood, over the painting's longer side: docs/store.md, "Lights found to be near". */
-export interface ToldDistance {
+export interface ToldDistance extends Told {
   readonly distance: number;
   readonly direction?: readonly (readonly number[])[];
-  readonly length?: number;
-  readonly weights?: readonly (readonly number[])[];
 }
 
 /** What a model leaves over, over the light's direction: docs/store.md, "The residual term". */
@@ -61,9 +59,19 @@ export interface ResidualTerm {
   readonly weights: readonly (readonly (readonly number[])[])[];
   readonly hull: readonly (readonly number[])[];
   readonly fade: number;
-  /** How strong the lights around a direction were: length of the kernel, and weights per channel. */
-  readonly strength?: { readonly length: number; readonly weights: readonly (readonly number[])[] };
+  /** How strong the lights around a direction were. */
+  readonly strength?: Told;
 }
+
+/** What lights tell of others, by a table; in older stores by a kernel's length and weights per channel. */
+export interface Told {
+  readonly table?: DirectionTable;
+  readonly length?: number;
+  readonly weights?: readonly (readonly number[])[];
+}
+
+/** Values by channel, zenith angle from 0 to 90°, and azimuth. */
+export type DirectionTable = readonly (readonly (readonly number[])[])[];
 
 export interface PhotographLight {
   readonly name: string;
@@ -121,7 +129,7 @@ export function checked(given: unknown, where: string): Attributes {
     }
     if (entry.residual && !isWhole(entry.residual, channels)) throw bad(`models: ${entry.name}: residual`);
     const told = entry.self_calibration?.distances?.told;
-    if (told && !isTold(told)) throw bad(`models: ${entry.name}: self_calibration`);
+    if (told && !isToldDistance(told)) throw bad(`models: ${entry.name}: self_calibration`);
   }
   return { ...attributes, models: attributes.models.filter(drawable) };
 }
@@ -138,10 +146,22 @@ const numbers = (list: unknown, count: number) =>
   Array.isArray(list) && list.length === count && list.every(Number.isFinite);
 const vectors = (list: unknown) => Array.isArray(list) && list.every((each) => numbers(each, 3));
 
+/** Whether what so many lights tell has all its numbers. */
+function isTold({ table, weights, length }: Told, lights: number, channels: number): boolean {
+  if (!table)
+    return length! > 0 && weights?.length === channels && weights.every((each) => numbers(each, lights));
+  const rows = table[0]?.length ?? 0;
+  const columns = table[0]?.[0]?.length ?? 0;
+  const whole = (channel: DirectionTable[number]) =>
+    channel.length === rows && channel.every((row) => numbers(row, columns));
+  return table.length === channels && rows > 1 && columns > 0 && table.every(whole);
+}
+
 /** Whether a distance has all its numbers. */
-function isTold({ distance, direction, length, weights }: ToldDistance): boolean {
-  const smooth = () => vectors(direction) && length! > 0 && numbers(weights![0], direction!.length);
-  return distance > 0 && (!weights || smooth());
+function isToldDistance(found: ToldDistance): boolean {
+  const { distance, direction = [] } = found;
+  const smooth = () => vectors(direction) && isTold(found, direction.length, 1);
+  return distance > 0 && ((!found.table && !found.weights) || smooth());
 }
 
 /** Whether a residual term has all its numbers. */
@@ -155,10 +175,7 @@ function isWhole(term: ResidualTerm, channels: number): boolean {
     [term.toe, term.length, term.fade].every((value) => value > 0) &&
     vectors(direction) &&
     vectors(hull) &&
-    (!strength ||
-      (strength.length > 0 &&
-        strength.weights.length === channels &&
-        strength.weights.every((values) => numbers(values, direction.length)))) &&
+    (!strength || isTold(strength, direction.length, channels)) &&
     weights?.length === components &&
     weights.every(
       (each) => each.length === channels && each.every((values) => numbers(values, direction.length)),
