@@ -13,15 +13,11 @@ use crate::record::{FitBlock, Layout};
 use crate::render::{self, Scene, Shader, Shading};
 use crate::residual::{LeftOver, Residual};
 use crate::slopes;
-use rayon::prelude::*;
+use crate::threads::on_all_threads;
 use std::sync::LazyLock;
 
 /// Pixels that one thread takes at a time: enough to hide the start of a task, few enough to share a tile evenly.
 pub const BLOCK: usize = 32 * LANES;
-
-/// Blocks that a thread takes at a time. Rayon by itself would cut the work of two threads into four parts, and one thread
-/// would often wait for the other, because files are read and written meanwhile.
-pub const BLOCKS_AT_A_TIME: usize = 8;
 
 /// Channels that the fit is compiled for: stacks of fewer leave the rest without weight.
 pub const MAX_CHANNELS: usize = 3;
@@ -136,16 +132,15 @@ fn fit_tile<F: FitBlock>(
         }
     }
     let make = || (make(), vec![0.0; BLOCK * width]);
-    let blocks = blocks.par_iter_mut().enumerate().with_max_len(BLOCKS_AT_A_TIME);
-    blocks.for_each_init(make, |(fit, rows), (block, (parts, status))| {
+    on_all_threads(blocks.into_iter().enumerate(), make, |(fit, rows), (block, (parts, status))| {
         let rows = &mut rows[..status.len() * width];
         fit_block(fit, block * BLOCK, rows, status);
         let mut first = 0;
         for (columns, part) in parts {
-            for (row, values) in rows.chunks(width).zip(part.chunks_mut(*columns)) {
-                values.copy_from_slice(&row[first..first + *columns]);
+            for (row, values) in rows.chunks(width).zip(part.chunks_mut(columns)) {
+                values.copy_from_slice(&row[first..first + columns]);
             }
-            first += *columns;
+            first += columns;
         }
     });
     Fitted { maps, status }

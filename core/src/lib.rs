@@ -30,3 +30,4 @@ mod separable;
 mod shadows;
 mod slopes;
 mod start;
+mod threads;

@@ -1,12 +1,12 @@
 //! Rendering: the radiance that fitted parameters give under any lights.
 
-use crate::dispatch::{BLOCK, BLOCKS_AT_A_TIME};
+use crate::dispatch::BLOCK;
 use crate::geometry::{Illumination, Place};
 use crate::lanes::{Isa, LANES, Lane, LaneMask, outlined};
 use crate::models::{MAX_SHAPE, Model, Optics};
 use crate::number::{Number, Real, array};
 use crate::residual::Residual;
-use rayon::prelude::*;
+use crate::threads::on_all_threads;
 
 /// Parameter maps of a tile, each (pixel, width).
 #[derive(Clone, Copy)]
@@ -169,18 +169,15 @@ pub fn render<const ISA: Isa>(shade: Shader<ISA>, scene: &Scene, residual: Optio
         }
     }
     let make = || (Shading::<ISA>::new(scene), Vec::new());
-    blocks.par_iter_mut().enumerate().with_max_len(BLOCKS_AT_A_TIME).for_each_init(
-        make,
-        |(shading, coefficients), (block, frames)| {
-            for first in (block * BLOCK..pixels.min((block + 1) * BLOCK)).step_by(LANES) {
-                shade(scene, first, shading);
-                outlined::<ISA, _>(
-                    #[inline(always)]
-                    || write(scene, first, shading, residual, coefficients, frames),
-                );
-            }
-        },
-    );
+    on_all_threads(blocks.iter_mut().enumerate(), make, |(shading, coefficients), (block, frames)| {
+        for first in (block * BLOCK..pixels.min((block + 1) * BLOCK)).step_by(LANES) {
+            shade(scene, first, shading);
+            outlined::<ISA, _>(
+                #[inline(always)]
+                || write(scene, first, shading, residual, coefficients, frames),
+            );
+        }
+    });
 }
 
 /// Writes a group into a block's part of each light's frame; `coefficients` is a buffer.

@@ -3,12 +3,12 @@
 //! It is taken and added on the scale f(Y) = √(max(Y, 0) + a) − √a of radiance over irradiance; the constant √a drops out
 //! of every difference here.
 
-use crate::dispatch::{BLOCK, BLOCKS_AT_A_TIME};
+use crate::dispatch::BLOCK;
 use crate::lanes::{Isa, LANES, Lane, outlined};
 use crate::number::{Number, Real, array};
 use crate::observations::Samples;
 use crate::render::{Scene, Shader, Shading};
-use rayon::prelude::*;
+use crate::threads::on_all_threads;
 
 /// Code of the coefficient 0.
 const ZERO: f32 = 32768.0;
@@ -120,8 +120,7 @@ impl LeftOver<'_> {
             let rest = shading.relative.clone();
             (shading, rest)
         };
-        let blocks = out.par_chunks_mut(BLOCK * width).enumerate().with_max_len(BLOCKS_AT_A_TIME);
-        blocks.for_each_init(make, |(shading, rest), (block, out)| {
+        on_all_threads(out.chunks_mut(BLOCK * width).enumerate(), make, |(shading, rest), (block, out)| {
             for (group, out) in out.chunks_mut(LANES * width).enumerate() {
                 let first = block * BLOCK + group * LANES;
                 shade(self.scene, first, shading);
