@@ -119,6 +119,35 @@ def test_an_index_that_points_outside_of_its_file_is_found(tmp_path, outside):
         open_array(tmp_path, f"{GROUP}/diffuse").read()
 
 
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ('"shape"', '"shbpe"'),
+        ('"data_type"', '"eata_type"'),
+        ('"float32"', '"floa332"'),
+        ('"float32"', '"M8[s]"'),
+        ('"chunk_grid"', '"chunk_grie"'),
+        ('"configuration"', '"cpnfiguration"'),
+        ('"chunk_shape"', '"chunk_shap"'),
+        ('"fill_value"', '"fill"'),
+        ('"attributes"', '"attribute"'),
+        ("256", "0"),
+        ("256", "255"),
+        ("256", "2.56"),
+        ("1024", '"1024"'),
+        ("1100", "-1100"),
+        ('"codecs": [', '"codecs": [], "rest": ['),
+    ],
+)
+def test_damaged_metadata_are_found_when_an_array_is_opened(tmp_path, right, wrong):
+    written(tmp_path)
+    path = tmp_path / GROUP / "diffuse" / "zarr.json"
+    assert right in path.read_text()
+    path.write_text(path.read_text().replace(right, wrong))
+    with pytest.raises(StoreError, match="metadata are damaged"):
+        open_array(tmp_path, f"{GROUP}/diffuse")
+
+
 def test_a_full_disk_is_told_as_one_where_another_map_waits_to_be_written(tmp_path):
     # The first map fails at once; the second, of a few bytes, when its file is closed.
     writer = stores.MapsWriter(tmp_path, GROUP, (DIFFUSE, STATUS), 300, 300, {})

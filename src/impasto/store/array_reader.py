@@ -7,6 +7,7 @@ codecs there are for it, twice the time for a tile of a stack. Of Zarr this know
 from __future__ import annotations
 
 import math
+import operator
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -44,8 +45,8 @@ class ArrayReader:
 
     Raises
     ------
-    ValueError, KeyError, TypeError
-        If the metadata are of another kind.
+    ValueError, LookupError, TypeError
+        If the metadata are of another kind, or damaged.
     """
 
     folder: Path
@@ -55,11 +56,20 @@ class ArrayReader:
         if self._encoding not in _ENCODINGS:
             names = ", ".join(self._encoding)
             raise ValueError(f"its chunks are encoded by {names}, expected bytes and zstd or gzip")
+        if self.dtype.kind not in "Ofui":
+            raise ValueError(f"its values are of type {self.dtype}, expected numbers or strings")
+        cut = zip(self.shape, self._piece, self._chunk, strict=True)
+        if any(length < 1 or chunk < 1 or piece % chunk for length, piece, chunk in cut):
+            raise ValueError(
+                f"its shape {self.shape}, files {self._piece} and chunks {self._chunk} do not match"
+            )
+        if missing := {"attributes", "fill_value"} - self.document.keys():
+            raise ValueError(f"it has no {' and no '.join(sorted(missing))}")
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
         """Lengths of the axes."""
-        return tuple(self.document["shape"])
+        return _lengths(self.document["shape"])
 
     @cached_property
     def dtype(self) -> np.dtype:
@@ -75,7 +85,7 @@ class ArrayReader:
     @cached_property
     def _piece(self) -> tuple[int, ...]:
         """Shape of what lies in one file."""
-        return tuple(self.document["chunk_grid"]["configuration"]["chunk_shape"])
+        return _lengths(self.document["chunk_grid"]["configuration"]["chunk_shape"])
 
     @cached_property
     def _sharding(self) -> Mapping[str, Any] | None:
@@ -93,7 +103,7 @@ class ArrayReader:
     @cached_property
     def _chunk(self) -> tuple[int, ...]:
         """Shape of what is compressed together."""
-        return tuple(self._sharding["chunk_shape"]) if self._sharding else self._piece
+        return _lengths(self._sharding["chunk_shape"]) if self._sharding else self._piece
 
     @cached_property
     def _grid(self) -> tuple[int, ...]:
@@ -179,6 +189,10 @@ class ArrayReader:
             return np.array(strings_decode(bytes(decoded)), object).reshape(self._chunk)
         decoded = decompress(data, compressor, count * self.dtype.itemsize)
         return np.frombuffer(decoded, self.dtype.newbyteorder("<")).reshape(self._chunk)
+
+
+def _lengths(numbers: Sequence[int]) -> tuple[int, ...]:
+    return tuple(map(operator.index, numbers))
 
 
 def _cells(region: Region, size: Sequence[int]) -> Iterator[tuple[Place, Region]]:

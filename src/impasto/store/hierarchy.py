@@ -193,7 +193,7 @@ def open_array(store: Path, path: str) -> ArrayReader:
     try:
         document = json.loads((store / path / "zarr.json").read_text(encoding="utf-8"))
         return ArrayReader(store / path, document)
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, LookupError, TypeError) as error:
         raise StoreError(
             Problem(
                 where=f"{store}: {path}",
