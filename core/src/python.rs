@@ -603,7 +603,7 @@ fn parse_grid<'a>(grid: &'a PyReadonlyArray3<'_, f32>) -> PyResult<Grid<'a>> {
     Ok(Grid { values: grid.values()?, rows: grid.shape()[0], columns: grid.shape()[1] })
 }
 
-/// Compresses bytes by zstd, with a checksum; see `impasto.store.zstd`.
+/// Compresses bytes by zstd, with a checksum; see `impasto.store.codecs`.
 #[pyfunction]
 fn zstd_encode<'py>(py: Python<'py>, data: PyReadonlyArray1<'py, u8>, level: i32) -> PyResult<Bound<'py, PyAny>> {
     let data = data.values()?;
