@@ -1,6 +1,8 @@
 """Directions of lights, found from photographs of a painting of which the truth is known."""
 
 import shutil
+import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ import zarr
 
 import impasto
 from impasto.fit import FitOptions
+from impasto.fit.choice import Choice
 from impasto.store import fit_attributes, open_stack
 
 MODEL = "torrance-sparrow"
@@ -53,6 +56,37 @@ def test_directions_that_were_misstated_are_found(relief, tmp_path):
     assert found["used"]
     assert found["left_out_db"]["corrected"] > found["left_out_db"]["stated"] + 0.1
     assert error_deg(found["corrected"], true) < 0.6 * before
+
+
+def test_directions_that_were_far_off_are_found_too(relief, tmp_path):
+    store, true = misstated(relief, tmp_path, 5.0)
+    before = error_deg(open_stack(store).lights.direction, true)
+    found = directions_found(store)
+    assert found["used"]
+    assert error_deg(found["corrected"], true) < 0.6 * before
+
+
+def test_far_turns_need_a_large_gain(relief, tmp_path, monkeypatch):
+    def turned(pixels, lights):
+        angle = np.radians(np.where(np.arange(len(lights)) % 2, 5.0, -5.0))
+        x, y, z = lights.direction.T
+        direction = np.stack(
+            [x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle), z], axis=1
+        )
+        return replace(lights, direction=direction)
+
+    store, _ = misstated(relief, tmp_path, 0.0)
+    calibration = sys.modules["impasto.fit.self_calibration"]
+    monkeypatch.setattr(calibration, "correct_directions", turned)
+    needed = []
+    monkeypatch.setattr(
+        calibration,
+        "choose",
+        lambda ways, error, worth_db: needed.append(worth_db) or Choice("stated", dict.fromkeys(ways, 0.0)),
+    )
+    far = directions_found(store)["turned_deg"]
+    assert needed[0] > 0.25
+    np.testing.assert_allclose(needed, 0.1 * np.square(far).mean() / 4.0, rtol=1e-3)
 
 
 def test_directions_that_were_right_stay(relief, tmp_path):

@@ -21,6 +21,9 @@ from impasto.fit.strength import find_strength
 from impasto.fit.trend import find_trend
 from impasto.geometry import Array, Lights, degrees_between
 
+# By how much directions are usually misstated, as in the prior of `correct_directions`.
+_USUAL_ERROR_DEG = 2.0
+
 # Rounds of fitting the pixels and then the lights; the strengths change by less than 1 % in the last.
 _ROUNDS = 3
 
@@ -130,7 +133,7 @@ def self_calibrate(
         As stated.
     directions : bool
         Whether directions may be corrected. They are where lights left out one by one are then met closer by
-        `WORTH_DB`, and where the lights are enough to tell them.
+        `WORTH_DB`, or more where lights turn far, and where the lights are enough to tell them.
     distances : bool
         Whether distant lights may be placed near, under the same conditions; a distance for each only where
         that meets lights left out closer by as much again than one for all.
@@ -145,8 +148,10 @@ def self_calibrate(
     placed = replace(stated.lights, intensity=lights.intensity)
     corrected = find_strengths(pixels, correct_directions(thinned, placed))
     ways = {"stated": stated, "corrected": corrected}
-    choice = choose(list(ways), lambda way: pixels.left_out_db(ways[way].lights))
     turned = degrees_between(lights.direction, corrected.lights.direction)
+    # The further lights turn, the less likely is it that they were stated so badly.
+    worth_db = WORTH_DB * max(1.0, float(np.square(turned).mean()) / _USUAL_ERROR_DEG**2)
+    choice = choose(list(ways), lambda way: pixels.left_out_db(ways[way].lights), worth_db)
     found = {
         "used": choice.used == "corrected",
         "left_out_db": choice.left_out_db,
