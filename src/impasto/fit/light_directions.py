@@ -30,6 +30,9 @@ _BLOCK = 256
 _OWN = 5
 _STEP = np.radians(0.5)
 
+USUAL_ERROR_DEG = 2.0
+"""By how much directions are usually misstated: the root mean square, over both angles."""
+
 # Standard deviations of what is to be found: of each of a light's two angles, 2° in all, in radians; of the
 # strengths' logarithm, which are found only to be set aside, so wide that the photographs alone tell them.
 _DIRECTION_SD = np.radians(1.41)

@@ -14,15 +14,12 @@ from numpy.typing import NDArray
 from impasto import store as stores
 from impasto.arm import find_arm
 from impasto.fit.choice import WORTH_DB, choose
-from impasto.fit.light_directions import MIN_LIGHTS, correct_directions
+from impasto.fit.light_directions import MIN_LIGHTS, USUAL_ERROR_DEG, correct_directions
 from impasto.fit.light_distances import find_distances
 from impasto.fit.light_evidence import least_radiance, log_ratio
 from impasto.fit.strength import find_strength
 from impasto.fit.trend import find_trend
 from impasto.geometry import Array, Lights, degrees_between
-
-# By how much directions are usually misstated, as in the prior of `correct_directions`.
-_USUAL_ERROR_DEG = 2.0
 
 # Rounds of fitting the pixels and then the lights; the strengths change by less than 1 % in the last.
 _ROUNDS = 3
@@ -150,7 +147,7 @@ def self_calibrate(
     ways = {"stated": stated, "corrected": corrected}
     turned = degrees_between(lights.direction, corrected.lights.direction)
     # The further lights turn, the less likely is it that they were stated so badly.
-    worth_db = WORTH_DB * max(1.0, float(np.square(turned).mean()) / _USUAL_ERROR_DEG**2)
+    worth_db = WORTH_DB * max(1.0, float(np.square(turned).mean()) / USUAL_ERROR_DEG**2)
     choice = choose(list(ways), lambda way: pixels.left_out_db(ways[way].lights), worth_db)
     found = {
         "used": choice.used == "corrected",
