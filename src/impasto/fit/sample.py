@@ -115,7 +115,8 @@ def grid_pixels(
         progress(title, height * width, show=show_progress) as advance,
         closing(read_tiles(stack, lights, stores.units(height, width))) as tiles,
     ):
-        for _, rows, columns, radiance in tiles:
+        for _, tile, radiance in tiles:
+            rows, columns = tile.rows, tile.columns
             # The grid is the whole picture's, so that it does not depend on how tiles are cut.
             first = [-(place.start + step // 2) % step for place in (rows, columns)]
             part = radiance[:, first[0] :: step, first[1] :: step]
@@ -124,4 +125,4 @@ def grid_pixels(
             ].reshape(2, -1)
             if len(row):
                 yield Sample(part.reshape(len(part), -1, part.shape[-1]).copy(), row, column)
-            advance(radiance.shape[1] * radiance.shape[2])
+            advance(tile.pixels)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import mmap
-from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing, suppress
@@ -23,9 +22,6 @@ _TILE_BYTES = 64 << 20
 
 # Threads that share the reading of a tile, because nothing can be computed before the first.
 _READERS = 2
-
-# Fitted tiles that may wait while a block is written, which takes a quarter of the time of a fit.
-_TILES_WAITING = 1
 
 
 def fit_units(
@@ -58,20 +54,18 @@ def fit_units(
     """
     maps: Maps = {}
 
-    def put(before: Future[None] | None, block: Tile, rows: slice, columns: slice, fitted: Maps) -> None:
-        if before is not None:
-            before.result()  # nothing is written after something that could not be
+    def put(block: Tile, tile: Tile, fitted: Maps) -> None:
         size = block.height, block.width
-        if (rows, columns) == (block.rows, block.columns):
+        if tile == block:
             write(block, {map.name: fitted[map.name].reshape(map.shape(*size)) for map in procedure.maps})
             return
         if not maps:
             maps.update({map.name: np.empty(map.shape(*size), map.dtype) for map in procedure.maps})
-        inside = Tile(rows, columns).within(block)
+        inside = tile.within(block)
         for name, values in maps.items():
             target = values[inside]
             target[...] = fitted[name].reshape(target.shape)
-        if rows.stop == block.rows.stop:
+        if tile.rows.stop == block.rows.stop:
             write(block, maps)
             maps.clear()
 
@@ -80,22 +74,20 @@ def fit_units(
         closing(read_tiles(stack, procedure.lights, blocks)) as tiles,
         ThreadPoolExecutor(1, thread_name_prefix="write") as writer,
     ):
-        waiting: deque[Future[None]] = deque()
         last: Future[None] | None = None
-        for block, rows, columns, radiance in tiles:
-            fitted = procedure.fit(radiance, rows, columns)
-            if len(waiting) == _TILES_WAITING:
-                waiting.popleft().result()
-            last = writer.submit(put, last, block, rows, columns, fitted)
-            waiting.append(last)
-            advance(radiance.shape[1] * radiance.shape[2])
+        for block, tile, radiance in tiles:
+            fitted = procedure.fit(radiance, tile.rows, tile.columns)
+            if last is not None:
+                last.result()  # nothing is written after something that could not be
+            last = writer.submit(put, block, tile, fitted)
+            advance(tile.pixels)
         if last is not None:
             last.result()
 
 
 def read_tiles(
     stack: Stack, lights: Sequence[int] | None, pieces: Sequence[Tile]
-) -> Generator[tuple[Tile, slice, slice, NDArray[Any]]]:
+) -> Generator[tuple[Tile, Tile, NDArray[Any]]]:
     """Yield the tiles of pieces of a stack, one piece after the other, while the next is being read.
 
     Parameters
@@ -108,9 +100,7 @@ def read_tiles(
 
     Yields
     ------
-    piece : Tile
-    rows, columns : slice
-        Where the tile lies.
+    piece, tile : Tile
     radiance : ndarray of shape (L, rows, columns, C), uint16 or float32
         Values as stored; valid until the next tile.
 
@@ -142,7 +132,7 @@ def read_tiles(
             values, parts = coming
             _wait(parts)
             coming = read(number + 1, pool) if number + 1 < len(tiles) else None
-            yield piece, tile.rows, tile.columns, values
+            yield piece, tile, values
 
 
 def _wait(parts: Sequence[Future[Any]]) -> None:

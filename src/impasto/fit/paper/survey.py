@@ -85,11 +85,11 @@ def _survey(store: Path, sha256: str, lights: tuple[int, ...], show_progress: bo
         progress("Looking for the highlight", height * width, show=show_progress) as advance,
         closing(read_tiles(stack, lights, stores.units(height, width))) as tiles,
     ):
-        for _, rows, columns, values in tiles:
-            peak.look(rows, columns, values)
-            below, right = (-rows.start) % step, (-columns.start) % step
+        for _, tile, values in tiles:
+            peak.look(tile.rows, tile.columns, values)
+            below, right = (-tile.rows.start) % step, (-tile.columns.start) % step
             grid.append(values[:, below::step, right::step].reshape(len(lights), -1, values.shape[-1]).copy())
-            advance(values.shape[1] * values.shape[2])
+            advance(tile.pixels)
     if peak.values is None:
         raise OptionError(
             Problem(
