@@ -1,5 +1,7 @@
 """Every photograph held out once, in rounds of fits."""
 
+import shutil
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,8 @@ from impasto.errors import OptionError
 from impasto.evaluate.held_out import fold_lights
 from impasto.geometry import zenith_azimuth
 from impasto.store import open_stack
+from impasto.summaries.evaluate import evaluate_tables
+from impasto.summaries.words import percent
 from store_files import contents
 
 
@@ -29,7 +33,7 @@ def test_folds_have_to_be_possible(painting, count):
         impasto.evaluate(painting, folds=2, held_out=3)
 
 
-def test_the_rounds_are_those_of_single_evaluations(painting):
+def test_the_rounds_are_those_of_single_evaluations(painting, tmp_path):
     before = contents(painting)
     whole = impasto.evaluate(painting, models=["phong"], folds=2)
     stack = open_stack(painting)
@@ -38,8 +42,21 @@ def test_the_rounds_are_those_of_single_evaluations(painting):
     (model,) = whole.models
     assert tuple(entry.name for entry in model.lights) == whole.held_out
     assert contents(painting) == before
-    first = [names[index] for index in fold_lights(stack.lights, 2)[0]]
-    half = impasto.evaluate(painting, models=["phong"], held_out_lights=first)
-    assert model.lights[: len(first)] == half.models[0].lights
     assert len(whole.baselines[0].lights) == len(names)
     assert model.mean.psnr_db == pytest.approx(np.mean([entry.errors.psnr_db for entry in model.lights]))
+    store = tmp_path / "p.zarr"  # which keeps what is found of single rounds
+    shutil.copytree(painting, store)
+    halves = []
+    for fold in fold_lights(stack.lights, 2):
+        chosen = [names[index] for index in fold]
+        alone = impasto.evaluate(store, models=["phong"], held_out_lights=chosen, baselines=False)
+        halves.append(alone.models[0])
+    assert model.lights == halves[0].lights + halves[1].lights
+    squared = [half.shares.samples * half.shares.rms**2 for half in halves]
+    for source in ("model", "lights", "shadows", "noise", "sampling"):
+        parts = [getattr(half.shares, source) * error for half, error in zip(halves, squared, strict=True)]
+        assert getattr(model.shares, source) == pytest.approx(sum(parts) / sum(squared))
+    assert model.shares.samples * model.shares.rms**2 == pytest.approx(sum(squared))
+    assert model.shares.photographs == len(names)
+    told = "\n".join(" ".join((heading, *map(" ".join, rows))) for heading, _, rows in evaluate_tables(whole))
+    assert f"phong {percent(model.shares.model)}" in told

@@ -154,5 +154,3 @@ def test_evaluate_keeps_the_shares_and_the_report_shows_them(painting, tmp_path)
     for entry in found.values():
         for source in SOURCES:
             assert f"<td>{100 * getattr(entry, source):.1f}\u00a0%</td>" in text
-    rounds = impasto.evaluate(store, folds=2, models=["torrance-sparrow"], baselines=False)
-    assert rounds.models[0].shares is None

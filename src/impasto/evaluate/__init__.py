@@ -219,11 +219,10 @@ def _judge(
                 lights=errors,
                 mean=mean_errors([entry.errors for entry in errors]),
                 without_residual=alone,
-                # Of several rounds no one fit stands for the result.
-                shares=_shares(fitted, stack, spec, options, held) if record else None,
+                shares=_shares(fitted, stack, spec, options, held),
             )
             results.append(result)
-            if not record:
+            if not record:  # of several rounds no one fit stands for the result
                 continue
             try:
                 write_evaluation(path, spec.name, _record(result, fitted, stack, kept), kept)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from impasto.evaluate.baselines import BaselineErrors
 from impasto.evaluate.errors import ImageErrors, mean_errors
 from impasto.evaluate.shares import ErrorShares
@@ -50,7 +52,7 @@ class ModelErrors:
     without_residual : ImageErrors or None
         The mean of the model alone, where the fit describes what it leaves over too.
     shares : ErrorShares or None
-        Whose the error is, of the model alone; None by the paper's procedure and over several rounds.
+        Whose the error is, of the model alone; None by the paper's procedure.
     """
 
     model: str
@@ -75,6 +77,7 @@ def join_models(found: Sequence[ModelErrors]) -> ModelErrors:
         without_residual=_weighted([entry for entry in alone if entry is not None], weights)
         if all(entry is not None for entry in alone)
         else None,
+        shares=_join_shares([part.shares for part in found if part.shares is not None]),
     )
 
 
@@ -95,3 +98,26 @@ def join_baselines(found: Sequence[Sequence[BaselineErrors]]) -> tuple[BaselineE
 
 def _weighted(means: Sequence[ImageErrors], weights: Sequence[int]) -> ImageErrors:
     return mean_errors([mean for mean, weight in zip(means, weights, strict=True) for _ in range(weight)])
+
+
+def _join_shares(found: Sequence[ErrorShares]) -> ErrorShares | None:
+    """Return the shares of the squared error of all rounds together, which add to 1 as those of each do."""
+    if not found:
+        return None
+    squared = np.array([part.samples * part.rms**2 for part in found])
+    total = float(squared.sum())
+    samples = sum(part.samples for part in found)
+    # Without any error all shares are the same: what is known of it is noise.
+    weights = squared if total else np.ones_like(squared)
+    shares = {
+        source: float(np.average([getattr(part, source) for part in found], weights=weights))
+        for source in ("model", "lights", "shadows", "noise", "sampling")
+    }
+    return ErrorShares(
+        **shares,
+        photographs=sum(part.photographs for part in found),
+        pixels=max(part.pixels for part in found),
+        samples=samples,
+        shadowed=float(np.mean([part.shadowed for part in found])),
+        rms=float(np.sqrt(total / max(samples, 1))),
+    )

@@ -57,6 +57,8 @@ class ErrorShares:
         How many photographs they are from.
     pixels : int
         How many pixels they are from.
+    samples : int
+        How many samples of these photographs and pixels count, which are neither clipped nor missing.
     shadowed : float
         Share of the samples of all photographs that lie in a cast shadow.
     rms : float
@@ -70,6 +72,7 @@ class ErrorShares:
     sampling: float
     photographs: int
     pixels: int
+    samples: int
     shadowed: float
     rms: float
 
@@ -207,13 +210,13 @@ def error_shares(model: ModelSpec, seen: Photographed, options: FitOptions) -> E
     usable = seen.usable & np.logical_and.reduce([np.isfinite(part) for part in rest])
     kept = usable & ~shadow[..., None]
     judged = usable & unseen[..., None]
-    samples = max(int(judged.sum()), 1)
+    samples = int(judged.sum())
     counted = (judged, judged, judged & kept, judged & kept)
     sums = [
         float(np.square(part[where], dtype=np.float64).sum())
         for part, where in zip(rest, counted, strict=True)
     ]
-    rms = float(np.sqrt(sums[0] / samples))
+    rms = float(np.sqrt(sums[0] / max(samples, 1)))
     # A step that makes the error larger takes nothing away.
     left = np.minimum.accumulate([*sums, _expected_noise(model, seen, kept, options)])
     if left[0] == 0.0:  # a perfect fit, of which noise is all that is known
@@ -227,6 +230,7 @@ def error_shares(model: ModelSpec, seen: Photographed, options: FitOptions) -> E
         sampling=float(sampling),
         photographs=int(seen.held_out.sum()),
         pixels=int(judged.any(axis=(0, 2)).sum()),
+        samples=samples,
         shadowed=float((usable & shadow[..., None]).sum()) / max(int(usable.sum()), 1),
         rms=rms,
     )
