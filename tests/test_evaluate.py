@@ -6,10 +6,12 @@ import shutil
 import numpy as np
 import pytest
 import tifffile
+import zarr
 
 import impasto
 from impasto.errors import OptionError
 from impasto.fit import FitOptions
+from impasto.light_strength import as_photographed
 from impasto.store import open_stack, read_evaluation
 from impasto.store.borrow import borrowed_stack
 
@@ -105,6 +107,38 @@ def test_a_fit_that_has_not_seen_them_is_judged_itself(painting, tmp_path):
     assert judged.lights == refitted.lights
     # It has seen this one.
     assert impasto.evaluate(store, held_out_lights=[*HELD, "light-000"]).models[0].refitted
+
+
+def test_renderings_that_follow_the_lamps_strengths_are_judged_beside_those_that_do_not(painting, tmp_path):
+    store = tmp_path / "p.zarr"
+    shutil.copytree(painting, store)
+    shutil.rmtree(store / "fits")
+    options = FitOptions(exclude=HELD, residual=True, residual_components=2, self_calibrate=False)
+    impasto.fit(store, models=[MODEL], options=options)
+    (plain,) = impasto.evaluate(store, held_out_lights=HELD, baselines=False).models
+    assert plain.as_photographed is None
+    group = zarr.open_group(store / "fits" / MODEL, mode="r+")
+    term = dict(group.attrs["residual"])
+    shape = len(term["weights"][0]), len(term["direction"])
+    term["strength"] = {"length": 0.4, "weights": np.full(shape, 0.05).tolist()}
+    group.attrs["residual"] = term
+    (judged,) = impasto.evaluate(store, held_out_lights=HELD, baselines=False).models
+    assert judged.mean == plain.mean
+    stack = open_stack(store)
+    _, height, width, _ = stack.shape
+    held = [stack.lights.names.index(name) for name in HELD]
+    stronger = as_photographed({"residual": term}, stack.lights.select(held)).intensity
+    rms = []
+    for photograph, rendering, strength in zip(
+        stack.radiance(slice(0, height), slice(0, width), held),
+        read_evaluation(store, MODEL).renderings(),
+        stronger / stack.lights.intensity[held],
+        strict=True,
+    ):
+        usable = np.isfinite(rendering) & (photograph < stack.clip_level)
+        difference = (rendering * strength - photograph)[usable]
+        rms.append(np.sqrt(np.mean(difference**2)) / photograph[usable].mean())
+    assert np.mean(rms) == pytest.approx(judged.as_photographed.rms_relative, rel=1e-3)
 
 
 def test_the_options_of_the_fit_in_the_store_are_kept(painting, tmp_path, monkeypatch):

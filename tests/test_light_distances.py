@@ -193,14 +193,14 @@ def test_positions_that_are_stated_stay(near, tmp_path):
     assert distances(fitted(store, tmp_path)) is None
 
 
-def test_even_light_comes_from_as_far_as_stated(near_fit, tmp_path):
+def test_distant_light_comes_from_as_far_as_stated(near_fit, tmp_path):
     impasto.render(near_fit.store, model=MODEL, light=[(60, 0)], out=tmp_path / "near", raw=True)
     impasto.render(
-        near_fit.store, model=MODEL, light=[(60, 0)], out=tmp_path / "even", raw=True, even_light=True
+        near_fit.store, model=MODEL, light=[(60, 0)], out=tmp_path / "far", raw=True, distant_light=True
     )
     left, right = (
         oiio.ImageInput.open(str(next((tmp_path / name).glob("*.exr")))).read_image("float").mean(axis=(0, 2))
-        for name in ("near", "even")
+        for name in ("near", "far")
     )
     ratio = left / right
     # From the right: |p|² / |p − x|² at the painting's sides, and the cosine, which falls like |p| / |p − x|.

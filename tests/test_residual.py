@@ -17,6 +17,7 @@ from impasto.fit.light_process import LightProcess, compress, hull_of
 from impasto.fit.remainder import left_over
 from impasto.fit.strength import find_strength
 from impasto.geometry import Camera, Lights, arm_direction, dome_direction, zenith_azimuth
+from impasto.light_strength import as_photographed
 from impasto.pixels import Pixels, near_positions_mm, render_pixels
 from impasto.residual import ZERO, ResidualTerm, encode, kernel, told
 from impasto.store import open_fit, open_stack
@@ -148,7 +149,8 @@ def test_added_as_docs_store_md_says(tabled):
     intensity = np.array([[1.0, 1.2, 0.8], [2.0, 2.0, 2.0]])
     diffuse = RNG.uniform(0.0, 1.0, size=(7, 3))
     diffuse[3] = np.nan
-    got = rendered(flat(diffuse, codes), found, Lights(("a", "b"), direction[:2], intensity=intensity))
+    stated = Lights(("a", "b"), direction[:2], intensity=intensity)
+    got = rendered(flat(diffuse, codes), found, as_photographed({"residual": found}, stated))
     for place in np.ndindex(2, 7, 3):
         which, pixel, channel = place
         near = np.exp(-np.square(direction[which] - direction).sum(axis=1) / (2 * 0.4**2))
@@ -236,11 +238,10 @@ def test_strengths_that_are_smooth_over_direction_are_told_to_lights_between():
         return 0.2 * np.sin(4.0 * at[:, :1] + [0.0, 0.3, 0.6]) * at[:, 1:2]
 
     found = find_strength(direction, smooth(direction) + RNG.normal(0.0, 0.01, (60, 1)))
-    term = ResidualTerm.of({"residual": {**plain_term(direction), "strength": found}})
-    off = np.log(term.strength(between)) - smooth(between)
+    off = np.log(strength_around({**plain_term(direction), "strength": found}, between)) - smooth(between)
     assert np.sqrt(np.square(off).mean()) < 0.3 * smooth(between).std()
     far = dome_direction(np.radians([88.0]), [1.0])
-    assert term.strength(far) == pytest.approx(1.0)
+    assert strength_around({**plain_term(direction), "strength": found}, far) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("way", ["spokes", "rings"])
@@ -276,16 +277,10 @@ def test_strengths_that_have_nothing_to_do_with_direction_are_not_told():
     assert sum(each is not None for each in draws) <= 2
 
 
-def test_even_lights_are_as_bright_as_stated():
-    direction = lights(30)
-    strength = {"length": 0.4, "weights": RNG.normal(0.0, 0.1, (3, 30)).tolist()}
-    stated = Lights(("a", "b"), direction[:2], intensity=np.array([[1.0], [2.0]]))
-    pixels = flat(np.full((4, 3), 0.3), np.full((4, 1), ZERO, np.uint16))
-    model = render_pixels(replace(pixels, residual=None), stated, CAMERA)
-    found = {**plain_term(direction), "strength": strength}
-    assert np.abs(rendered(pixels, found, stated) / model - 1.0).max() > 0.05
-    even = rendered(pixels, found, ResidualTerm.of({"residual": found}).even(stated))
-    np.testing.assert_allclose(even, model, rtol=1e-4)
+def strength_around(found, direction):
+    """Return how strong the lights around directions (L, 3) were, by the attribute of a term."""
+    stated = Lights(tuple(map(str, range(len(direction)))), direction)
+    return as_photographed({"residual": found}, stated).intensity
 
 
 def plain_term(direction):
@@ -363,7 +358,7 @@ def test_highlights_have_a_colour_of_their_own_where_lights_left_out_ask_for_it(
         np.testing.assert_allclose(np.median(colour / colour[..., :1], axis=(0, 1)), metal, rtol=0.05)
 
 
-def test_renderings_of_even_light_do_not_follow_the_strengths(painting, tmp_path):
+def test_renderings_follow_the_lamps_strengths_only_where_they_are_asked_to(painting, tmp_path):
     store = fitted(painting, tmp_path, residual=True, residual_components=2, self_calibrate=False)
     group = zarr.open_group(store / "fits" / MODEL, mode="r+")
     found = dict(group.attrs["residual"])
@@ -372,13 +367,13 @@ def test_renderings_of_even_light_do_not_follow_the_strengths(painting, tmp_path
     group.attrs["residual"] = found
     light = (20.0, 60.0)
     images = []
-    for even in (False, True):
-        out = tmp_path / str(even)
-        impasto.render(store, model=MODEL, light=[light], out=out, raw=True, even_light=even)
+    for follow in (True, False):
+        out = tmp_path / str(follow)
+        impasto.render(store, model=MODEL, light=[light], out=out, raw=True, as_photographed=follow)
         images.append(oiio.ImageInput.open(str(out / "1.exr")).read_image("float"))
-    strength = ResidualTerm.of({"residual": found}).strength(dome_direction(*np.radians([light]).T))
-    assert strength.min() > 1.05
-    np.testing.assert_allclose(images[0], images[1] * strength[0], rtol=1e-3, atol=1e-5)
+    stronger = strength_around(found, dome_direction(*np.radians([light]).T))
+    assert stronger.min() > 1.05
+    np.testing.assert_allclose(images[0], images[1] * stronger[0], rtol=1e-3, atol=1e-5)
 
 
 def test_the_papers_procedure_has_none(painting):

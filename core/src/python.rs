@@ -355,7 +355,6 @@ struct ResidualItems<'py> {
     codes: CodeItems<'py>,
     table: Option<PyReadonlyArray1<'py, f32>>,
     basis: PyReadonlyArray3<'py, f32>,
-    strength: PyReadonlyArray2<'py, f32>,
     toe: f32,
 }
 
@@ -384,14 +383,7 @@ impl ResidualItems<'_> {
         };
         check("codes", found, scene.parameters.pixels * components)?;
         check("basis", self.basis.len(), scene.intensity.len() * components)?;
-        check("strength", self.strength.len(), scene.intensity.len())?;
-        Ok(Residual {
-            codes,
-            components,
-            basis: self.basis.values()?,
-            strength: self.strength.values()?,
-            toe: self.toe,
-        })
+        Ok(Residual { codes, components, basis: self.basis.values()?, toe: self.toe })
     }
 }
 

@@ -30,8 +30,6 @@ pub struct Residual<'a> {
     pub components: usize,
     /// (light and channel, component): what one step of a coefficient adds.
     pub basis: &'a [f32],
-    /// Per light and channel.
-    pub strength: &'a [f32],
     pub toe: f32,
 }
 
@@ -66,7 +64,7 @@ impl Residual<'_> {
             value = coefficient.mul_add(Lane([*basis; LANES]), value);
         }
         let value = value.max(toe.sqrt());
-        (value * value - toe) * Lane([self.strength[place]; LANES])
+        value * value - toe
     }
 }
 

@@ -6,14 +6,14 @@ docs/store.md specifies the numbers; why they are what they are says docs/decisi
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from impasto.direction_table import look_up
-from impasto.geometry import Array, Lights
+from impasto.geometry import Array
 
 Values = NDArray[np.float32]
 
@@ -90,8 +90,6 @@ class ResidualTerm:
         Sine of the angle over which the term fades outside of the hull.
     table : ndarray of shape (256,), float32, or None
         Of a published store, what stands for a code in place of its distance from `ZERO`.
-    strength_told : mapping or None
-        How strong the lights around a direction were, as `told` takes it; None where that is not told.
     """
 
     direction: Array
@@ -102,7 +100,6 @@ class ResidualTerm:
     hull: Array
     fade: float
     table: Values | None = None
-    strength_told: Mapping[str, Any] | None = None
 
     @classmethod
     def of(cls, attributes: Mapping[str, Any]) -> ResidualTerm | None:
@@ -124,7 +121,6 @@ class ResidualTerm:
             hull=array("hull"),
             fade=float(found["fade"]),
             table=array("table").astype(np.float32) if published else None,
-            strength_told=found.get("strength"),
         )
 
     @property
@@ -145,27 +141,13 @@ class ResidualTerm:
         result: Array = values * self.share(direction)[:, None, None]
         return result
 
-    def strength(self, direction: ArrayLike) -> Array:
-        """Return how strong the lights around directions (L, 3) were, with the fading, as (L, 1 or C)."""
-        if self.strength_told is None:
-            return np.ones((len(np.asarray(direction)), 1))
-        logarithm = told(self.strength_told, direction, self.direction)
-        result: Array = np.exp(logarithm * self.share(direction)[:, None])
-        return result
-
-    def even(self, lights: Lights) -> Lights:
-        """Return lights under which renderings are as bright as under `lights` of the strength stated."""
-        return replace(lights, intensity=lights.intensity / self.strength(lights.direction))
-
     def under(self, direction: ArrayLike) -> dict[str, Any]:
         """Return what the core needs besides the codes to add the term at directions (L, 3), if anything."""
         basis = self.basis(direction) * self.step[:, None]
-        strength = self.strength(direction)
-        if not (basis.any() or np.any(strength != 1.0)):
+        if not basis.any():
             return {}
         return {
             "table": self.table,
             "basis": np.ascontiguousarray(basis.transpose(0, 2, 1), np.float32),
-            "strength": np.ascontiguousarray(np.broadcast_to(strength, basis[:, 0].shape), np.float32),
             "toe": self.toe,
         }

@@ -33,9 +33,13 @@ def render(
             help="Light on the arm, degrees, or a sweep START:STOP:STEP; may be repeated.",
         ),
     ] = None,
-    even_light: Annotated[
+    as_photographed: Annotated[
         bool,
-        typer.Option("--even-light", help="Do not follow strength and distance of the lights photographed."),
+        typer.Option("--as-photographed", help="Lights as strong as a lamp held by hand was around them."),
+    ] = False,
+    distant_light: Annotated[
+        bool,
+        typer.Option("--distant-light", help="Lights far away though those of the photographs were near."),
     ] = False,
     display: Annotated[
         str, typer.Option("--display", metavar="NAME|FILE", help="srgb, display-p3 or an ICC profile.")
@@ -79,7 +83,8 @@ def render(
             lights=lights,
             light=[parse_light(text) for text in light or ()],
             arm=parse_angles(arm or ()),
-            even_light=even_light,
+            as_photographed=as_photographed,
+            distant_light=distant_light,
             out=out,
             display=display,
             exposure=exposure,

@@ -22,6 +22,7 @@ from impasto.evaluate.results import LightErrors, ModelErrors, join_baselines, j
 from impasto.evaluate.shares import ErrorShares, Photographed, error_shares
 from impasto.fit import FitOptions, fit
 from impasto.geometry import Lights, zenith_azimuth
+from impasto.light_strength import as_photographed
 from impasto.models import ModelSpec, parse_model
 from impasto.progress import progress
 from impasto.render import render_bands
@@ -207,11 +208,16 @@ def _judge(
                     show_progress=show_progress,
                 )
             fitted = open_fit(source, spec.name)
-            errors, kept = _compare(fitted, stack, held, show_progress)
-            alone = None
-            if "residual" in fitted.attributes:
-                without, _ = _compare(fitted, stack, held, show_progress, residual=False)
+            lights = stack.lights.select(np.asarray(held))
+            errors, kept = _compare(fitted, stack, held, lights, show_progress)
+            alone = followed = None
+            if residual := fitted.attributes.get("residual"):
+                without, _ = _compare(fitted, stack, held, lights, show_progress, residual=False)
                 alone = mean_errors([entry.errors for entry in without])
+                if "strength" in residual:
+                    strong = as_photographed(fitted.attributes, lights)
+                    following, _ = _compare(fitted, stack, held, strong, show_progress)
+                    followed = mean_errors([entry.errors for entry in following])
             result = ModelErrors(
                 model=spec.name,
                 procedure=str(fitted.attributes["procedure"]),
@@ -219,6 +225,7 @@ def _judge(
                 lights=errors,
                 mean=mean_errors([entry.errors for entry in errors]),
                 without_residual=alone,
+                as_photographed=followed,
                 shares=_shares(fitted, stack, spec, options, held),
             )
             results.append(result)
@@ -270,10 +277,15 @@ def _settings(store: Path, model: str) -> tuple[str | None, FitOptions]:
 
 
 def _compare(
-    fitted: Fit, stack: Stack, held: Sequence[int], show_progress: bool | None, *, residual: bool = True
+    fitted: Fit,
+    stack: Stack,
+    held: Sequence[int],
+    lights: Lights,
+    show_progress: bool | None,
+    *,
+    residual: bool = True,
 ) -> tuple[tuple[LightErrors, ...], NDArray[np.float32]]:
-    """Compare renderings of the held-out lights with their photographs; return these, thinned out, too."""
-    lights = stack.lights.select(np.asarray(held))
+    """Compare renderings under lights with the held-out photographs; return these, thinned out, too."""
     _, height, width, channels = stack.shape
     gathered = [ErrorAccumulator(height, width, channels) for _ in held]
     step = _step(stack)

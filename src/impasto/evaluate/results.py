@@ -51,6 +51,9 @@ class ModelErrors:
         The mean over them.
     without_residual : ImageErrors or None
         The mean of the model alone, where the fit describes what it leaves over too.
+    as_photographed : ImageErrors or None
+        The mean under lights as strong as a lamp held by hand was around them, where the fit tells it; all
+        else is under lights as strong as stated.
     shares : ErrorShares or None
         Whose the error is, of the model alone; None by the paper's procedure.
     """
@@ -61,6 +64,7 @@ class ModelErrors:
     lights: tuple[LightErrors, ...]
     mean: ImageErrors
     without_residual: ImageErrors | None = None
+    as_photographed: ImageErrors | None = None
     shares: ErrorShares | None = None
 
 
@@ -68,6 +72,8 @@ def join_models(found: Sequence[ModelErrors]) -> ModelErrors:
     """Return the errors of one model over all rounds, each with other photographs held out."""
     lights = tuple(entry for part in found for entry in part.lights)
     alone = [part.without_residual for part in found]
+    # A round that tells no strengths renders under lights as strong as stated.
+    strong = [part.as_photographed or part.mean for part in found]
     weights = [len(part.lights) for part in found]
     return replace(
         found[0],
@@ -77,6 +83,7 @@ def join_models(found: Sequence[ModelErrors]) -> ModelErrors:
         without_residual=_weighted([entry for entry in alone if entry is not None], weights)
         if all(entry is not None for entry in alone)
         else None,
+        as_photographed=_weighted(strong, weights) if any(part.as_photographed for part in found) else None,
         shares=_join_shares([part.shares for part in found if part.shares is not None]),
     )
 

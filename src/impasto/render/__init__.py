@@ -20,6 +20,7 @@ from impasto.colour.displays import Display
 from impasto.colour.rendition import Rendition, Shown
 from impasto.geometry import Camera, Lights
 from impasto.light_distance import without_distance
+from impasto.light_strength import as_photographed as strong_as_photographed
 from impasto.models import parse_model
 from impasto.output import prepare_folder
 from impasto.pixels import read_pixels, render_pixels
@@ -27,7 +28,6 @@ from impasto.progress import progress
 from impasto.render.animation import Animation
 from impasto.render.display import requested_rendition
 from impasto.render.lights import requested_lights
-from impasto.residual import ResidualTerm
 from impasto.store import Fit, PublishedStack, Stack, is_published, open_fit, open_published, open_stack
 
 _BAND_BYTES = 192e6
@@ -107,7 +107,8 @@ def render(
     lights: str | PathLike[str] | Lights | None = None,
     light: Sequence[tuple[float, float]] = (),
     arm: Sequence[float] = (),
-    even_light: bool = False,
+    as_photographed: bool = False,
+    distant_light: bool = False,
     out: str | PathLike[str],
     display: str | PathLike[str] | Display = "srgb",
     exposure: float = 1.0,
@@ -136,9 +137,12 @@ def render(
         Zenith and azimuth of single lights, degrees.
     arm : sequence of float, optional
         Arm angles, degrees.
-    even_light : bool, optional
-        Whether lights are as strong and as far away as stated, where the fit tells how strong and how near
-        those around them were; else they are so.
+    as_photographed : bool, optional
+        Whether lights are as strong as those of the photographs around them were, where the fit tells it, to
+        be compared with a photograph; by default they are as strong as stated.
+    distant_light : bool, optional
+        Whether lights without a position are far away where the fit found those of the photographs near; by
+        default they stand as near as those.
     out : path
         Folder for the pictures, made if it is not there; pictures of the same names are replaced.
     display : str, path or Display, optional
@@ -185,10 +189,10 @@ def render(
         wanted = lights
     else:
         wanted = requested_lights(lights, light, arm, channels, stack.camera)
-    term = ResidualTerm.of(fit.attributes)
-    if even_light:
+    if as_photographed:
+        wanted = strong_as_photographed(fit.attributes, wanted)
+    if distant_light:
         fit = replace(fit, attributes=without_distance(fit.attributes))
-        wanted = wanted if term is None else term.even(wanted)
     rendition = requested_rendition(
         stack,
         display=display,

@@ -28,6 +28,8 @@ def evaluate_tables(summary: EvaluateSummary) -> Iterator[tuple[str, Row, list[R
         rows.append(("mean", "", *_errors(model.mean)))
         if model.without_residual is not None:
             rows.append(("mean, model alone", "", *_errors(model.without_residual)))
+        if model.as_photographed is not None:
+            rows.append(("mean, as photographed", "", *_errors(model.as_photographed)))
         how = "fitted again without them" if model.refitted else "the fit in the store has not seen them"
         yield f"{model.model} ({model.procedure}; {how})", header, rows
     shared = [(model.model, model.shares) for model in summary.models if model.shares is not None]

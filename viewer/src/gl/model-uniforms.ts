@@ -3,7 +3,7 @@
 import type { Attributes, GlossTable, ModelEntry, ResidualTerm } from "../store/attributes";
 import { placeLights } from "./light-distance";
 import { floatTexture, type Program } from "./program";
-import { residualBasis, residualStrength } from "./residual";
+import { residualBasis } from "./residual";
 import type { Scene, ShaderLight } from "./scene";
 
 const GLOSS_ANGLE = 60;
@@ -109,10 +109,9 @@ export class ModelUniforms {
       const rows = lights.flatMap(({ place }) => {
         const length = Math.hypot(...place);
         const direction = place.map((value) => value / length);
-        const texels = [...residualBasis(term, direction), residualStrength(term, direction)];
-        return texels.flatMap((channels) => [...channels, 0]);
+        return residualBasis(term, direction).flatMap((channels) => [...channels, 0]);
       });
-      const texture = floatTexture(gl, term.components + 1, lights.length, new Float32Array(rows));
+      const texture = floatTexture(gl, term.components, lights.length, new Float32Array(rows));
       basis = { lights: key, texture };
       this.#bases.set(name, basis);
     }

@@ -1,7 +1,7 @@
 /** What a model leaves over, as the shader adds it: docs/store.md, "The residual term"; src/impasto/residual.py. */
 
 import type { ResidualTerm } from "../store/attributes";
-import { dot, kernelSum, told } from "./told";
+import { dot, kernelSum } from "./told";
 
 /** Returns how much of the term is left at a light's direction. */
 function share(term: ResidualTerm, direction: readonly number[]): number {
@@ -23,14 +23,6 @@ export function residualBasis(term: ResidualTerm, direction: readonly number[]):
   );
 }
 
-/** Returns how strong the lights around a direction were, in three channels. */
-export function residualStrength(term: ResidualTerm, direction: readonly number[]): number[] {
-  if (!term.strength) return [1, 1, 1];
-  const left = share(term, direction);
-  const logarithms = threeChannels(told(term.strength, term.direction, direction));
-  return logarithms.map((value) => Math.exp(left * value));
-}
-
 /** Adds a term to the radiance per unit of irradiance in one channel. */
 export function withResidual(radiance: number, added: number, toe: number): number {
   const root = Math.sqrt(toe);
@@ -44,7 +36,7 @@ struct Residual { float coefficient[${Math.max(components, 1)}]; };
 uniform usampler2D residualCodes;  // the tile's coefficients
 uniform int residualBlocks;        // texels of four codes per pixel, 0 where the tile is not there yet
 uniform sampler2D residualTable;   // the coefficient of each code
-uniform sampler2D residualBasis;   // per component and light; then the strength of the lights around it
+uniform sampler2D residualBasis;   // per component and light
 uniform float toe;
 
 Residual residual(ivec2 at) {
@@ -64,7 +56,7 @@ vec3 withResidual(vec3 radiance, Residual r, int light) {
   for (int k = 0; k < ${components}; k++) added += r.coefficient[k] * texelFetch(residualBasis, ivec2(k, light), 0).rgb;
   float root = sqrt(toe);
   vec3 value = max(sqrt(max(radiance, vec3(0.0)) + toe) - root + added, vec3(0.0)) + root;
-  return (value * value - toe) * texelFetch(residualBasis, ivec2(${components}, light), 0).rgb;
+  return value * value - toe;
 }
 `;
 }

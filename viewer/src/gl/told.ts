@@ -1,4 +1,4 @@
-/** What the photographs' lights tell of others, such as their strength: docs/store.md; src/impasto/residual.py. */
+/** What the photographs' lights tell of others, such as their distance: docs/store.md; src/impasto/residual.py. */
 
 import type { DirectionTable, Told } from "../store/attributes";
 

@@ -59,8 +59,6 @@ export interface ResidualTerm {
   readonly weights: readonly (readonly (readonly number[])[])[];
   readonly hull: readonly (readonly number[])[];
   readonly fade: number;
-  /** How strong the lights around a direction were. */
-  readonly strength?: Told;
 }
 
 /** What lights tell of others, by a table; in older stores by a kernel's length and weights per channel. */
@@ -147,26 +145,25 @@ const numbers = (list: unknown, count: number) =>
 const vectors = (list: unknown) => Array.isArray(list) && list.every((each) => numbers(each, 3));
 
 /** Whether what so many lights tell has all its numbers. */
-function isTold({ table, weights, length }: Told, lights: number, channels: number): boolean {
-  if (!table)
-    return length! > 0 && weights?.length === channels && weights.every((each) => numbers(each, lights));
+function isTold({ table, weights, length }: Told, lights: number): boolean {
+  if (!table) return length! > 0 && weights?.length === 1 && numbers(weights[0]!, lights);
   const rows = table[0]?.length ?? 0;
   const columns = table[0]?.[0]?.length ?? 0;
   const whole = (channel: DirectionTable[number]) =>
     channel.length === rows && channel.every((row) => numbers(row, columns));
-  return table.length === channels && rows > 1 && columns > 0 && table.every(whole);
+  return table.length === 1 && rows > 1 && columns > 0 && table.every(whole);
 }
 
 /** Whether a distance has all its numbers. */
 function isToldDistance(found: ToldDistance): boolean {
   const { distance, direction = [] } = found;
-  const smooth = () => vectors(direction) && isTold(found, direction.length, 1);
+  const smooth = () => vectors(direction) && isTold(found, direction.length);
   return distance > 0 && ((!found.table && !found.weights) || smooth());
 }
 
 /** Whether a residual term has all its numbers. */
 function isWhole(term: ResidualTerm, channels: number): boolean {
-  const { components, direction, weights, hull, strength } = term;
+  const { components, direction, weights, hull } = term;
   return (
     Number.isInteger(components) &&
     components >= 1 &&
@@ -175,7 +172,6 @@ function isWhole(term: ResidualTerm, channels: number): boolean {
     [term.toe, term.length, term.fade].every((value) => value > 0) &&
     vectors(direction) &&
     vectors(hull) &&
-    (!strength || isTold(strength, direction.length, channels)) &&
     weights?.length === components &&
     weights.every(
       (each) => each.length === channels && each.every((values) => numbers(values, direction.length)),

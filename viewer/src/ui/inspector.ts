@@ -1,7 +1,7 @@
 /** A pixel's parameters, and its radiance under a light that moves in the plane of the present one. */
 
 import { evaluateBasis } from "../gl/basis";
-import { residualBasis, residualStrength, withResidual } from "../gl/residual";
+import { residualBasis, withResidual } from "../gl/residual";
 import { findModel } from "../models";
 import type { ModelEntry } from "../store/attributes";
 import type { Codes, Layer, PublishedStore } from "../store/published";
@@ -161,10 +161,9 @@ export class Inspector {
     const coefficients = Array.from(await this.#codes(layer, x, y), (code) => table[code]!);
     return curve.map((point) => {
       const basis = residualBasis(model.residual!, point.light);
-      const strength = residualStrength(model.residual!, point.light);
       const radiance = point.radiance.map((value, c) => {
         const added = coefficients.reduce((sum, coefficient, k) => sum + coefficient * basis[k]![c]!, 0);
-        return withResidual(value, added, toe) * strength[c]!;
+        return withResidual(value, added, toe);
       });
       return { ...point, radiance };
     });

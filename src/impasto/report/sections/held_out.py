@@ -15,6 +15,7 @@ from impasto.report.subject import Subject, drawn
 from impasto.store import Evaluation, Fit, read_evaluation
 
 _SHOWN_LIGHTS = 3
+AS_PHOTOGRAPHED = "mean, as photographed"
 
 
 def section(subject: Subject) -> Section:
@@ -39,6 +40,12 @@ def section(subject: Subject) -> Section:
         "These photographs judge the renderings, because the fits behind them had not seen them. RMS / mean "
         "compares relative radiance where samples are not clipped; PSNR and SSIM compare pictures in sRGB."
     )
+    if any(each.attributes.get("as_photographed") for each in current.values()):
+        page.text(
+            "Renderings are under lights as strong as stated, so by how much the lamp of a photograph was "
+            f"stronger or weaker counts as error. “{AS_PHOTOGRAPHED}” is the mean where renderings follow "
+            "the strengths that the other photographs tell."
+        )
     for model, each in current.items():
         page.table(
             ("photograph", "light from the normal", "RMS / mean", "PSNR, dB", "SSIM"),
@@ -69,9 +76,12 @@ def _rows(evaluation: Evaluation) -> list[tuple[str, ...]]:
             "unknown" if errors[name] is None else format(errors[name], how) for name, how in formats.items()
         )
 
-    lights = evaluation.attributes["lights"]
+    found = evaluation.attributes
+    lights = found["lights"]
     rows = [(entry["name"], f"{entry['zenith_deg']:.1f}°", *cells(entry["errors"])) for entry in lights]
-    return [*rows, ("mean", "", *cells(evaluation.attributes["mean"]))]
+    if found.get("as_photographed"):
+        rows.append((AS_PHOTOGRAPHED, "", *cells(found["as_photographed"])))
+    return [*rows, ("mean", "", *cells(found["mean"]))]
 
 
 def _add_pictures(page: Section, subject: Subject, current: Mapping[str, Evaluation]) -> None:
