@@ -19,6 +19,7 @@ from impasto.store import (
     units,
 )
 from impasto.store.hierarchy import coarser_group
+from store_files import fit_attributes
 
 SEED = 8
 COMPONENTS = 7  # no multiple of four, by which they lie in the page's textures
@@ -39,14 +40,13 @@ def write_every_model(folder, width, height):
             channels=channels,
             coloured=spec.ambient,  # for half of the models
         )
-        attributes = {
-            "model": spec.name,
-            "procedure": "joint",
-            "index_of_refraction": 1.45 if spec.name.startswith("gtr") else 1.5,
-            "fresnel": "element" if spec.name.endswith("smith") else "facet",
-            "light_rgb": [1.04, 1.0, 0.96],
-            "status_meaning": {},
-        }
+        attributes = fit_attributes(
+            spec.name,
+            index_of_refraction=1.45 if spec.name.startswith("gtr") else 1.5,
+            fresnel="element" if spec.name.endswith("smith") else "facet",
+            light_rgb=[1.04, 1.0, 0.96],
+            status_meaning={},
+        )
         if spec.ambient:
             *others, status = maps
             maps = (*others, residual_map(COMPONENTS), status)

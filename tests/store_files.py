@@ -64,6 +64,32 @@ def attributes(group):
     return json.loads((group / "zarr.json").read_text())["attributes"]
 
 
+def change_attributes(group, change):
+    """Change the attributes of a group or array by a function of them."""
+    metadata = json.loads((group / "zarr.json").read_text())
+    change(metadata["attributes"])
+    (group / "zarr.json").write_text(json.dumps(metadata))
+
+
+def fit_attributes(model, **more):
+    """Return attributes of a fit that was not computed."""
+    return {
+        "program": "impasto",
+        "version": "0",
+        "model": model,
+        "procedure": "joint",
+        "index_of_refraction": 1.5,
+        "fresnel": "facet",
+        "options": {"exclude": []},
+        "light_rgb": [1.0, 1.0, 1.0],
+        "photographs": 4,
+        "settings_sha256": "none",
+        "pixels": {},
+        "clipped_samples": 0,
+        **more,
+    }
+
+
 @contextmanager
 def largest_file(size):
     """Let no file grow beyond `size` bytes: to a program this is a full disk."""

@@ -14,7 +14,7 @@ import pytest
 from impasto import store as stores
 from impasto.errors import StoreError
 from impasto.geometry import Camera, Lights, dome_direction
-from store_files import attributes, chunks_in, contents, flip_byte, photograph
+from store_files import attributes, chunks_in, contents, fit_attributes, flip_byte, photograph
 
 LAYOUT = Path(__file__).resolve().parents[1] / "docs" / "store.md"
 
@@ -45,7 +45,10 @@ def make_stack(path, pixels, **changed):
         dtype=pixels.dtype,
         lights=lights,
         camera=Camera(distance_mm=2000.0, mm_per_px=0.1),
-        inputs=[{"name": name, "file": f"{name}.tif"} for name in lights.names],
+        inputs=[
+            {"name": name, "file": f"{name}.tif", "dtype": "uint16", "transfer": "linear"}
+            for name in lights.names
+        ],
         **settings,
     )
     writer = stores.StackWriter(path, header, fresh=False)
@@ -62,7 +65,7 @@ MAPS = stores.fit_maps(("c",), lobes=1, ambient=True, channels=3)
 
 def make_fit(path, rng, height=1100, width=1050, maps=MAPS, model="phong"):
     """Write random maps as a complete fit, and return them."""
-    writer = stores.MapsWriter(path, f"fits/{model}", maps, height, width, {"model": model})
+    writer = stores.MapsWriter(path, f"fits/{model}", maps, height, width, fit_attributes(model))
     written = {map.name: rng.random(map.shape(height, width), np.float32) for map in maps[:-1]}
     written["status"] = rng.integers(0, 6, (height, width)).astype(np.uint8)
     for unit in stores.units(height, width):

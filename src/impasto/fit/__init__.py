@@ -286,7 +286,7 @@ class _Job:
             "status_meaning": {str(code): text for code, text in stores.STATUS_MEANING.items()},
             "settings_sha256": stores.digest(settings),
         }
-        self.found = stores.fit_attributes(store, model)
+        self.found = stores.read_group(store / stores.fit_group(model))
         self.notes: tuple[str, ...] = ()
 
     @property
@@ -306,8 +306,12 @@ class _Job:
         return found is not None and not self._complete and found.items() >= self.attributes.items()
 
     def problems(self, overwrite: bool) -> list[Problem]:
-        """Return what forbids the fit: one that is complete and was made otherwise."""
-        if overwrite or not self._complete or self._same_settings:
+        """Return what forbids the fit: one that is complete and is damaged or was made otherwise."""
+        if overwrite or not self._complete:
+            return []
+        if damage := stores.fit_problems(self.store, self.model, self.found or {}):
+            return damage
+        if self._same_settings:
             return []
         return [
             Problem(

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
 from impasto import store as stores
-from impasto.errors import Problem
+from impasto.errors import Problem, StoreError
 
 _MAX_COMPONENTS = 64
 
@@ -162,8 +162,18 @@ class FitOptions:
 
     @classmethod
     def of(cls, attributes: Mapping[str, Any]) -> FitOptions:
-        """Return the options that a fit with these attributes was made with."""
+        """Return the options that a fit with these attributes was made with.
+
+        Raises
+        ------
+        StoreError
+            If this version does not know some of them.
+        """
         options = dict(attributes["options"])
+        if unknown := sorted(options.keys() - {option.name for option in fields(cls)}):
+            what = f"was made with options that this version does not know: {', '.join(unknown)}"
+            do = "Use the version of impasto that made it, or a newer one"
+            raise StoreError(Problem(f"the fit of {attributes['model']}", what, do))
         options["exclude"] = tuple(options["exclude"])
         return cls(index=attributes["index_of_refraction"], fresnel=attributes["fresnel"], **options)
 

@@ -192,6 +192,8 @@ def _compare(store: Path, job: Job, overwrite: bool) -> tuple[bool, bool]:
     fits = stores.fitted_models(store)
     if overwrite or not (complete or fits):
         return complete, False
+    if found is not None:
+        raise_problems(StoreError, stores.stack_problems(store, found))
     difference = "its photographs were removed" if found is None else job.difference(found)
     if not difference:
         return False, complete

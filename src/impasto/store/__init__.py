@@ -15,7 +15,16 @@ from impasto.errors import StoreError
 from impasto.geometry import Camera, Lights
 from impasto.store.evaluations import Evaluation, read_evaluation, write_evaluation
 from impasto.store.files import RunLog, digest, log_path, no_room, run, size_on_disk
-from impasto.store.fits import Fit, Maps, MapsWriter, fit_attributes, fitted_models, open_fit, remove_fit
+from impasto.store.fits import (
+    Fit,
+    Maps,
+    MapsWriter,
+    fit_attributes,
+    fit_problems,
+    fitted_models,
+    open_fit,
+    remove_fit,
+)
 from impasto.store.hierarchy import (
     coarser_group,
     fit_group,
@@ -48,7 +57,7 @@ from impasto.store.layout import (
 )
 from impasto.store.published import PublishedStack, is_published, open_published
 from impasto.store.stack_writer import StackHeader, StackWriter, noted_digest
-from impasto.store.stacks import Stack, open_stack
+from impasto.store.stacks import Stack, open_stack, stack_problems
 
 if TYPE_CHECKING:
     from xarray import DataTree
@@ -83,6 +92,7 @@ __all__ = [
     "fit_attributes",
     "fit_group",
     "fit_maps",
+    "fit_problems",
     "fitted_models",
     "is_published",
     "level_sizes",
@@ -105,6 +115,7 @@ __all__ = [
     "shadowed_map",
     "size_on_disk",
     "source_problems",
+    "stack_problems",
     "target_problems",
     "unit_at",
     "units",

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from impasto.errors import StoreError, raise_problems
+from impasto.store.attributes import EVALUATION, attribute_problems
 from impasto.store.files import reading
 from impasto.store.hierarchy import (
     Attributes,
@@ -24,6 +26,7 @@ from impasto.store.hierarchy import (
 from impasto.store.layout import EVALUATIONS
 
 _ARRAY = "radiance"
+_AGAIN = "Run impasto evaluate again"
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,7 @@ class Evaluation:
         """
         path = f"{EVALUATIONS}/{self.attributes['model']}/{_ARRAY}"
         array = open_array(self.store, path)
-        with reading(self.store, path, "Run impasto evaluate again"):
+        with reading(self.store, path, _AGAIN):
             if array.lost():
                 raise ValueError("a part of the renderings is lost")
             return array.read()
@@ -86,9 +89,19 @@ def write_evaluation(
 
 
 def read_evaluation(store: Path, model: str) -> Evaluation | None:
-    """Return the recorded evaluation of a model, or None where there is none."""
-    attributes = read_group(store / EVALUATIONS / model)
-    return Evaluation(store, attributes) if attributes and attributes.get("complete") else None
+    """Return the recorded evaluation of a model, or None where there is none.
+
+    Raises
+    ------
+    StoreError
+        If its attributes are damaged.
+    """
+    group = f"{EVALUATIONS}/{model}"
+    attributes = read_group(store / group)
+    if not attributes or not attributes.get("complete"):
+        return None
+    raise_problems(StoreError, attribute_problems(store, group, attributes, EVALUATION, _AGAIN))
+    return Evaluation(store, attributes)
 
 
 def _strict(value: Any) -> Any:

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto.errors import Problem, StoreError
+from impasto.errors import Problem, StoreError, raise_problems
 from impasto.store.array_reader import ArrayReader
 from impasto.store.arrays import array_document
+from impasto.store.attributes import attribute_problems, fit_kind
 from impasto.store.chunks import encode_chunks
 from impasto.store.files import DAMAGE, reading, writing
 from impasto.store.hierarchy import (
@@ -47,6 +48,8 @@ from impasto.store.layout import (
 from impasto.store.shards import Shard, new_shard
 
 Maps = dict[str, NDArray[Any]]
+
+_AGAIN = "Run impasto fit with --overwrite to compute it anew"
 
 # Maps that are encoded and written at a time.
 _WRITERS = 2
@@ -241,8 +244,26 @@ def _document(map: Map, height: int, width: int) -> dict[str, Any]:
 
 
 def fit_attributes(store: str | Path, model: str) -> Attributes | None:
-    """Return the attributes of a fit, complete or not, or None if there is none."""
-    return read_group(Path(store) / fit_group(model))
+    """Return the attributes of a fit, complete or not, or None if there is none.
+
+    Raises
+    ------
+    StoreError
+        If they are damaged.
+    """
+    attributes = read_group(Path(store) / fit_group(model))
+    if attributes is not None:
+        raise_problems(StoreError, fit_problems(Path(store), model, attributes))
+    return attributes
+
+
+def fit_problems(store: Path, model: str, attributes: Attributes) -> list[Problem]:
+    """Return everything that is wrong with the attributes of a fit."""
+    group = fit_group(model)
+    path = f"{group}/diffuse"
+    shape = open_array(store, path).shape if has_array(store, path) else ()
+    channels = shape[2] if len(shape) == 3 else None
+    return attribute_problems(store, group, attributes, fit_kind(model, attributes, channels), _AGAIN)
 
 
 def remove_fit(store: Path, model: str) -> None:
@@ -309,11 +330,10 @@ class Fit:
         """
         tile = {}
         for name in self.names if names is None else names:
-            do = "Run impasto fit with --overwrite to compute it anew"
             path = f"{self.group}/{name}"
             if self._arrays[name].lost(rows, columns):
-                raise StoreError(Problem(f"{self.store}: {path}", "has lost a part of its pixels", do))
-            with reading(self.store, path, do):
+                raise StoreError(Problem(f"{self.store}: {path}", "has lost a part of its pixels", _AGAIN))
+            with reading(self.store, path, _AGAIN):
                 tile[name] = self._arrays[name].read(rows, columns)
         return tile
 
@@ -332,7 +352,8 @@ def open_fit(store: str | Path, model: str, level: int = 0) -> Fit:
     Raises
     ------
     StoreError
-        If there is no store, it is from a newer version, or the fit or the level is missing or not finished.
+        If there is no store, it is from a newer version, or the fit or the level is missing, not finished or
+        damaged.
     """
     store = Path(store)
     problems = source_problems(store)
@@ -357,6 +378,8 @@ def open_fit(store: str | Path, model: str, level: int = 0) -> Fit:
                 do="Run the same impasto fit command again: it goes on from there",
             )
         )
+    if level == 0:
+        raise_problems(StoreError, fit_problems(store, model, attributes))
     return Fit(store, group, attributes)
 
 

@@ -49,6 +49,8 @@ def read_group(path: Path) -> Attributes | None:
         if metadata["node_type"] != "group":
             return None
         attributes: Attributes = metadata.get("attributes", {})
+        if not isinstance(attributes, dict):
+            raise TypeError(f"its attributes are {attributes!r:.40}, expected an object")
         return attributes
     except (FileNotFoundError, NotADirectoryError):
         return None

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from impasto.errors import Problem, StoreError
 from impasto.geometry import Camera, Lights
 from impasto.store.arrays import array_document
+from impasto.store.attributes import stack_kind
 from impasto.store.chunks import encode_chunks
 from impasto.store.files import digest, writing
 from impasto.store.hierarchy import (
@@ -178,11 +179,13 @@ class StackWriter:
         if read_group(store) is None:
             write_group(store, "", {"impasto_schema": SCHEMA, **provenance()})
         found = read_group(store / STACK)
+        kind = stack_kind(self._header.shape[0], self._header.shape[3], complete=False)
         if (
             found is not None
             and not fresh
             and all(found.get(key) == settings[key] for key in settings)
             and read_array_metadata(store, _RADIANCE) == self._document
+            and not any(kind(found, ""))
         ):
             return found
         remove(store, EVALUATIONS, FITS, PYRAMIDS, STACK)

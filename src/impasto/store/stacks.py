@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from impasto.errors import Problem, StoreError, raise_problems
 from impasto.geometry import Camera, Lights
 from impasto.store.array_reader import ArrayReader
+from impasto.store.attributes import attribute_problems, stack_kind
 from impasto.store.files import DAMAGE, digest, reading
 from impasto.store.hierarchy import (
     Attributes,
@@ -24,8 +25,6 @@ from impasto.store.hierarchy import (
 )
 from impasto.store.layout import ASSUMED_WHITE, STACK
 from impasto.store.stack_writer import noted_digest, unfinished_stack
-
-_REQUIRED = ("scale", "offset", "clip_level", "noise", "camera", "inputs", "settings_sha256")
 
 _AGAIN = "Run impasto stack with the same photographs and --overwrite to write it anew"
 
@@ -48,10 +47,14 @@ class Stack:
     def _radiance(self) -> ArrayReader:
         return open_array(self.store, f"{STACK}/radiance")
 
-    def _table(self, name: str, *, known: bool = True) -> NDArray[Any]:
+    def _table(self, name: str, *axes: int, known: bool = True) -> NDArray[Any]:
         # What is not known is NaN for every light, and Zarr need not write that.
         path = f"{STACK}/{name}"
         array = open_array(self.store, path)
+        shape, values = (self.shape[0], *axes), "strings" if name == "light_name" else "numbers"
+        if array.shape != shape or (array.dtype == object) != (values == "strings"):
+            what = f"is {array.dtype} of shape {array.shape}, expected {values} of shape {shape}"
+            raise StoreError(Problem(f"{self.store}: {path}", what, _AGAIN))
         if known and array.lost():
             raise StoreError(Problem(f"{self.store}: {path}", "has lost its values", _AGAIN))
         with reading(self.store, path, _AGAIN):
@@ -73,9 +76,9 @@ class Stack:
         """The lights, one per photograph."""
         return Lights(
             names=tuple(str(name) for name in self._table("light_name")),
-            direction=self._table("light_direction"),
-            position_mm=self._table("light_position_mm", known=False),
-            intensity=self._table("light_intensity"),
+            direction=self._table("light_direction", 3),
+            position_mm=self._table("light_position_mm", 3, known=False),
+            intensity=self._table("light_intensity", self.shape[3]),
             angular_size_deg=self._table("light_angular_size_deg", known=False),
         )
 
@@ -212,13 +215,33 @@ class Stack:
         return values
 
 
+def stack_problems(store: Path, attributes: Attributes) -> list[Problem]:
+    """Return everything that is wrong with the attributes of a store's stack.
+
+    Raises
+    ------
+    StoreError
+        If the metadata of its photographs are damaged.
+    """
+    path = f"{STACK}/radiance"
+    lights, channels = None, None
+    if has_array(store, path):
+        array = open_array(store, path)
+        if len(array.shape) != 4 or array.dtype not in (np.uint16, np.float32):
+            what = f"is {array.dtype} of shape {array.shape}, expected uint16 or float32 along 4 axes"
+            return [Problem(f"{store}: {path}", what, _AGAIN)]
+        lights, _, _, channels = array.shape
+    kind = stack_kind(lights, channels, complete=bool(attributes.get("complete")))
+    return attribute_problems(store, STACK, attributes, kind, _AGAIN)
+
+
 def open_stack(store: str | Path) -> Stack:
     """Open the stack of a store.
 
     Raises
     ------
     StoreError
-        If there is no store, it is from a newer version, or its stack is missing or not finished.
+        If there is no store, it is from a newer version, or its stack is missing, not finished or damaged.
     """
     store = Path(store)
     problems = source_problems(store)
@@ -229,11 +252,9 @@ def open_stack(store: str | Path) -> Stack:
         raise StoreError(
             Problem(str(store), "has no stack of photographs", "Make it with: impasto stack PHOTOS STORE")
         )
+    raise_problems(StoreError, stack_problems(store, attributes))
     if not attributes.get("complete"):
         raise StoreError(unfinished_stack(store, attributes))
-    if missing := [name for name in _REQUIRED if name not in attributes]:
-        what = f"lacks the attributes {', '.join(missing)}"
-        raise StoreError(Problem(f"{store}: {STACK}/zarr.json", what, _AGAIN))
     if not has_array(store, f"{STACK}/radiance"):
         raise StoreError(Problem(f"{store}: {STACK}/radiance", "has lost its metadata", _AGAIN))
     return Stack(store, attributes)

@@ -1,0 +1,217 @@
+"""What the attributes of a store's groups are: docs/store.md in code, checked when a group is opened."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from impasto.errors import Problem
+from impasto.store.hierarchy import Attributes
+from impasto.store.kinds import (
+    COUNT,
+    FLAG,
+    NOT_NEGATIVE,
+    NUMBER,
+    POSITIVE,
+    TEXT,
+    Kind,
+    each,
+    kind,
+    numbers,
+    one_of,
+    or_null,
+    record,
+)
+from impasto.store.layout import STATUS_MEANING
+
+_OBJECT = record({})
+_MADE_BY = {"program": TEXT, "version": TEXT}
+
+
+def attribute_problems(store: Path, group: str, attributes: Attributes, of: Kind, do: str) -> list[Problem]:
+    """Return everything that is wrong with the attributes of a group.
+
+    Parameters
+    ----------
+    store : Path
+    group : str
+        Path of the group.
+    attributes : dict
+    of : callable
+        What they have to be.
+    do : str
+        How to mend them.
+    """
+    return [Problem(f"{store}: {group}/zarr.json", what, do) for what in of(attributes, "")]
+
+
+def stack_kind(lights: int | None, channels: int | None, *, complete: bool) -> Kind:
+    """Return what the attributes of a stack are; None stands for a number that is not known."""
+    digest, count = (TEXT, COUNT) if complete else (or_null(TEXT), or_null(COUNT))
+    photograph = record(
+        {"name": TEXT, "file": TEXT, "dtype": TEXT, "transfer": TEXT, "clipped_samples": count},
+        {
+            "blake3": digest,
+            "sha256": digest,  # of earlier versions
+            **dict.fromkeys(("exposure_s", "f_number", "iso"), or_null(NUMBER)),
+            **dict.fromkeys(("camera", "lens", "taken"), TEXT),
+            "shift_px": numbers(2),
+        },
+    )
+    camera = {
+        "view_direction": numbers(3),
+        "distance_mm": or_null(POSITIVE),
+        "mm_per_px": or_null(POSITIVE),
+    }
+    colour = {"matrix": numbers(3, None), "white_xyz": numbers(3), "source": TEXT}
+    return record(
+        {
+            **_MADE_BY,
+            "scale": NUMBER,
+            "offset": NUMBER,
+            "clip_level": each(or_null(NUMBER), channels),
+            "noise": record(dict.fromkeys(("read", "photon", "relative"), NOT_NEGATIVE)),
+            "camera": record(camera),
+            "inputs": each(photograph, lights),
+            "settings_sha256": TEXT,
+        },
+        {
+            "light_rgb": numbers(channels),
+            "light_rgb_source": TEXT,
+            "camera_colour": or_null(record(colour)),
+            "white_reference": or_null(_OBJECT),
+            "light_file": record({"file": TEXT}),
+            "notes": each(TEXT),
+            "complete": FLAG,
+        },
+    )
+
+
+def fit_kind(model: str, attributes: Attributes, channels: int | None) -> Kind:
+    """Return what the attributes of a fit are, whose parts have to match; None as for `stack_kind`."""
+    lights = _count(attributes, "photographs")
+    counts = {"pixels": record({}, dict.fromkeys(STATUS_MEANING.values(), COUNT)), "clipped_samples": COUNT}
+    return record(
+        {
+            **_MADE_BY,
+            "model": one_of(model),
+            "procedure": TEXT,
+            "index_of_refraction": POSITIVE,
+            "fresnel": one_of("facet", "element"),
+            "options": _OPTIONS,
+            "light_rgb": numbers(channels),
+            "photographs": COUNT,
+            "settings_sha256": TEXT,
+            **(counts if attributes.get("complete") else {}),
+        },
+        {
+            "notes": each(TEXT),
+            "self_calibration": _self_calibration(lights, channels),
+            "highlight_colour": record({"used": one_of("white", "own")}),
+            "residual": _residual,
+            "sample": _SAMPLE,
+            "complete": FLAG,
+        },
+    )
+
+
+def _count(found: Attributes, name: str) -> int | None:
+    """Return a count, None where it is not known."""
+    value: int | None = found.get(name)
+    return None if any(COUNT(value, name)) else value
+
+
+_OPTIONS = record(
+    {"exclude": each(TEXT)},
+    {
+        **dict.fromkeys(("loss", "highlight", "highlight_colour"), TEXT),
+        **dict.fromkeys(("shadow_level", "threshold_deg"), or_null(NUMBER)),
+        **dict.fromkeys(("shadows", "share_reflectance", "refined", "residual"), FLAG),
+        **dict.fromkeys(("calibrate_directions", "calibrate_distances"), FLAG),
+        "loss_scale": POSITIVE,
+        "max_steps": COUNT,
+        "residual_components": COUNT,
+        "self_calibrate": or_null(FLAG),
+    },
+)
+
+_SAMPLE = record({"arm_azimuth_deg": NUMBER, "threshold_deg": NUMBER, "row": COUNT, "column": COUNT})
+
+
+def _over_direction(value: Any, name: str) -> Iterator[str]:
+    """Check what is told over direction: by a table or, in older stores, by the weights of a kernel."""
+    if isinstance(value, dict) and "weights" in value:
+        return record({"weights": numbers(None, None), "length": POSITIVE})(value, name)
+    return record({"table": numbers(None, None, None)})(value, name)
+
+
+def _told(value: Any, name: str) -> Iterator[str]:
+    yield from record({"distance": POSITIVE})(value, name)
+    if isinstance(value, dict) and {"table", "weights"} & value.keys():
+        yield from _over_direction(value, name)
+
+
+def _self_calibration(lights: int | None, channels: int | None) -> Kind:
+    found = {"common": POSITIVE, "own": numbers(lights)}
+    corrected = {"corrected": numbers(lights, 3)}
+
+    def distances(value: Any, name: str) -> Iterator[str]:
+        used = value.get("used") if isinstance(value, dict) else None
+        needed = {"used": one_of("stated", *found)} | {key: of for key, of in found.items() if key == used}
+        return record(needed, {**found, "told": or_null(_told)})(value, name)
+
+    def directions(value: Any, name: str) -> Iterator[str]:
+        used = isinstance(value, dict) and value.get("used") is True
+        return record({"used": FLAG, **(corrected if used else {})}, corrected)(value, name)
+
+    strengths = numbers(lights, channels)
+    return record({"gain": strengths, "trend": strengths}, {"directions": directions, "distances": distances})
+
+
+def _residual(value: Any, name: str) -> Iterator[str]:
+    """Check a residual term, whose parts have to match."""
+    found = value if isinstance(value, dict) else {}
+    components = _count(found, "components")
+    lights = len(found["direction"]) if isinstance(found.get("direction"), list) else None
+    return record(
+        {
+            "components": COUNT,
+            "step": numbers(components),
+            "toe": POSITIVE,
+            "direction": numbers(lights, 3),
+            "length": POSITIVE,
+            "weights": numbers(components, None, lights),
+            "hull": numbers(None, 3),
+            "fade": POSITIVE,
+        },
+        {"zero": COUNT, "strength": or_null(_over_direction)},
+    )(value, name)
+
+
+_OR_UNKNOWN = or_null(NUMBER)
+_ERRORS = record(
+    dict.fromkeys(("psnr_db", "ssim", "rms_relative"), _OR_UNKNOWN),
+    dict.fromkeys(("compared", "predicted", "ciede2000"), _OR_UNKNOWN),
+)
+_SHARES = record(
+    {**dict.fromkeys(("model", "lights", "shadows", "noise"), _OR_UNKNOWN), "pixels": COUNT},
+    {"sampling": _OR_UNKNOWN},  # which earlier versions did not tell
+)
+_JUDGED = record({"name": TEXT, "zenith_deg": NUMBER, "azimuth_deg": NUMBER, "errors": _ERRORS})
+
+EVALUATION = record(
+    {
+        "model": TEXT,
+        "procedure": TEXT,
+        "index_of_refraction": POSITIVE,
+        "fresnel": TEXT,
+        "options": _OPTIONS,
+        "stack_sha256": TEXT,
+        "px_per_px": kind("a whole number from 1", lambda value: type(value) is int and value > 0),
+        "lights": each(_JUDGED),
+        "mean": _ERRORS,
+    },
+    {"shares": or_null(_SHARES)},
+)
+"""What the attributes of an evaluation are."""
