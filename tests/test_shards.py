@@ -107,16 +107,40 @@ def test_a_flipped_byte_is_found(tmp_path, position):
         open_array(tmp_path, f"{GROUP}/diffuse").read()
 
 
+def change_index(shard, entry):
+    """Say another offset and size of the first chunk of 4 x 4, with a right checksum."""
+    data = bytearray(shard.read_bytes())
+    data[-260:-244] = np.array(entry, "<u8").tobytes()
+    data[-4:] = google_crc32c.value(bytes(data[-260:-4])).to_bytes(4, "little")
+    shard.write_bytes(bytes(data))
+
+
 @pytest.mark.parametrize("outside", [(2**63, 10), (2**64 - 2, 10), (0, 2**40), (0, 2**64 - 2), (10**9, 10)])
 def test_an_index_that_points_outside_of_its_file_is_found(tmp_path, outside):
     written(tmp_path)
-    shard = tmp_path / GROUP / "diffuse" / "c" / "1" / "0" / "0"
-    data = bytearray(shard.read_bytes())
-    data[-260:-244] = np.array(outside, "<u8").tobytes()
-    data[-4:] = google_crc32c.value(bytes(data[-260:-4])).to_bytes(4, "little")
-    shard.write_bytes(bytes(data))
+    change_index(tmp_path / GROUP / "diffuse" / "c" / "1" / "0" / "0", outside)
     with pytest.raises(ValueError, match="the file has"):
         open_array(tmp_path, f"{GROUP}/diffuse").read()
+
+
+@pytest.mark.parametrize(("map", "last"), [("diffuse", "/0"), ("status", "")])
+def test_a_chunk_that_a_shard_lacks_is_found_where_it_is_asked_for(tmp_path, map, last):
+    values = written(tmp_path)[map]
+    change_index(tmp_path / GROUP / f"{map}/c/1/0{last}", (2**64 - 1, 2**64 - 1))
+    fit = stores.Fit(tmp_path, GROUP, {})
+    beside = slice(1024, 1100), slice(256, 300)
+    np.testing.assert_array_equal(fit.read(*beside, [map])[map], values[beside])
+    with pytest.raises(
+        StoreError, match=f"{GROUP}/{map}: is damaged: a shard lacks its chunk 0, 0.*--overwrite"
+    ):
+        fit.read(slice(1000, 1050), slice(0, 10), [map])
+
+
+def test_a_unit_whose_status_lacks_a_chunk_is_not_whole(tmp_path):
+    written(tmp_path)
+    change_index(tmp_path / GROUP / "status/c/1/0", (2**64 - 1, 2**64 - 1))
+    writer = stores.MapsWriter(tmp_path, GROUP, (DIFFUSE, STATUS), HEIGHT, WIDTH, {})
+    assert [unit.row for unit in writer.unfinished()] == [1]
 
 
 @pytest.mark.parametrize(

@@ -122,7 +122,7 @@ class ArrayReader:
         return [number for number in numbers if not os.path.exists(self._file(number))]
 
     def read(self, *slices: slice, out: NDArray[Any] | None = None) -> NDArray[Any]:
-        """Return the values of a selection, the fill value where there is no file.
+        """Return the values of a selection, the fill value where there is no file (see `lost`).
 
         Parameters
         ----------
@@ -134,7 +134,7 @@ class ArrayReader:
         Raises
         ------
         OSError, RuntimeError, ValueError
-            If a chunk is damaged; each has a checksum.
+            If a chunk is damaged, which its checksum tells, or a file lacks one.
         """
         region = self._region(slices)
         values = np.empty([part.stop - part.start for part in region], self.dtype) if out is None else out

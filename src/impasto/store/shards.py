@@ -78,17 +78,17 @@ def read_index(file: int, grid: Sequence[int]) -> NDArray[np.uint64]:
     return np.frombuffer(data, "<u8", 2 * math.prod(grid)).reshape(*grid, 2)
 
 
-def chunk_in(file: int, index: NDArray[np.uint64], place: Place) -> bytes | None:
-    """Return the bytes of a chunk of an open shard, None where it has none.
+def chunk_in(file: int, index: NDArray[np.uint64], place: Place) -> bytes:
+    """Return the bytes of a chunk of an open shard that lies inside of the array: impasto writes every one.
 
     Raises
     ------
     ValueError
-        If the index says that they lie beyond the end of the file.
+        If the shard lacks the chunk, or the index says that it lies beyond the end of the file.
     """
     offset, size = index[place].tolist()
     if offset == _NONE:
-        return None
+        raise ValueError(f"a shard lacks its chunk {', '.join(map(str, place))}")
     if offset + size > (end := os.fstat(file).st_size):
         raise ValueError(f"a chunk of {size} bytes at byte {offset}, and the file has {end}")
     return os.pread(file, size, offset)
