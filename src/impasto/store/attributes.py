@@ -212,6 +212,6 @@ EVALUATION = record(
         "lights": each(_JUDGED),
         "mean": _ERRORS,
     },
-    {"shares": or_null(_SHARES)},
+    {"as_photographed": or_null(_ERRORS), "shares": or_null(_SHARES)},
 )
 """What the attributes of an evaluation are."""
