@@ -23,7 +23,7 @@ from impasto.errors import OptionError, Problem
 from impasto.evaluate.gloss import PixelGloss
 from impasto.evaluate.glossmeter import GLOSSMETERS
 from impasto.fit.pyramid import halve
-from impasto.light_distance import only_told, place_lights
+from impasto.light_distance import only_told
 from impasto.maps.integration import integrate_normals
 from impasto.models import MODELS, parse_model
 from impasto.publish.arrays import Codes, PackedArray, pixels_of
@@ -115,11 +115,7 @@ class Publication:
         self.levels = 1 + len(level_sizes(*self.size))
         self.arrays: dict[str, PackedArray] = {}
         entries = [self._add_model(name) for name in names]
-        lights = stack.lights
-        if stack.camera.mm_per_px is not None:  # else positions would be in pixels
-            first = open_fit(self.store, names[0]).attributes
-            lights, _ = place_lights(first, self.size, lights, stack.camera)
-        pictures, kept = photograph_arrays(stack, lights, spread(lights.direction, photographs))
+        pictures, kept = photograph_arrays(stack, spread(stack.lights.direction, photographs))
         self.arrays.update(pictures)
         self.attributes: dict[str, Any] = {
             **provenance(),

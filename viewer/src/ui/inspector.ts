@@ -1,6 +1,7 @@
 /** A pixel's parameters, and its radiance under a light that moves in the plane of the present one. */
 
 import { evaluateBasis } from "../gl/basis";
+import { placeLights, seenFrom } from "../gl/light-distance";
 import { residualBasis, withResidual } from "../gl/residual";
 import { findModel } from "../models";
 import type { ModelEntry } from "../store/attributes";
@@ -25,9 +26,11 @@ export interface PixelValue {
   readonly units: string;
 }
 
+/** The light's angle and direction are those from the centre of the painting, radiance is per unit of irradiance. */
 interface CurvePoint {
   readonly angle: number;
   readonly light: Vector;
+  readonly falloff: number;
   readonly radiance: readonly number[];
 }
 
@@ -119,7 +122,7 @@ export class Inspector {
     return h("table", {}, h("caption", {}, model.title), h("tbody", {}, ...rows));
   }
 
-  /** Radiance over angles of the light, by the shader's own basis. */
+  /** Radiance over angles of the light, by the shader's own basis, with the light as far away as it is drawn. */
   #curve(model: ModelEntry, values: PixelValue[], x: number, y: number, azimuth: number): CurvePoint[] {
     const pick = (name: string) => values.filter((value) => value.name === name).map((value) => value.value);
     const [nx, ny] = pick("normal") as [number, number];
@@ -135,7 +138,10 @@ export class Inspector {
     const view = this.#view(x, y);
     const sweep: number[] = [];
     for (let angle = -89; angle <= 89; angle += STEP_DEG) sweep.push(angle);
-    const cases = sweep.map((angle) => ({ normal, view, shape, light: direction(angle, azimuth) }));
+    const distant = sweep.map((angle) => ({ place: direction(angle, azimuth), near: false }));
+    const place = this.#place(x, y);
+    const lights = placeLights(distant, model, this.store.attributes).map((light) => seenFrom(place, light));
+    const cases = lights.map(({ direction: light }) => ({ normal, view, shape, light }));
     const optics = { index: model.index_of_refraction, element: model.fresnel === "element" };
     const basis = evaluateBasis(this.gl, given, optics, cases);
     const [diffuse, ambient, tint] = [pick("diffuse"), pick("ambient"), pick("specular_rgb")];
@@ -144,7 +150,7 @@ export class Inspector {
       const radiance = model.light_rgb.map(
         (colour, c) => diffuse[c]! * d! + (ambient[c] ?? 0) + colour * (tint[c] ?? 1) * highlight,
       );
-      return { angle: sweep[i]!, light: cases[i]!.light, radiance };
+      return { angle: sweep[i]!, light: distant[i]!.place, falloff: lights[i]!.falloff, radiance };
     });
   }
 
@@ -169,33 +175,42 @@ export class Inspector {
     });
   }
 
-  #view(x: number, y: number): Vector {
-    const { view_direction, distance_mm, mm_per_px } = this.store.attributes.camera;
-    if (distance_mm === null || mm_per_px === null) return view_direction as Vector;
-    const place = [
-      (x - (this.store.width - 1) / 2) * mm_per_px,
-      -(y - (this.store.height - 1) / 2) * mm_per_px,
-      0,
-    ];
-    const offset = view_direction.map((value, i) => value * distance_mm - place[i]!);
-    const length = Math.hypot(...offset);
-    return offset.map((value) => value / length) as Vector;
+  /** Where a pixel lies on the painting, in mm; without a scale, in pixels. */
+  #place(x: number, y: number): [number, number] {
+    const scale = this.store.attributes.camera.mm_per_px ?? 1;
+    return [(x - (this.store.width - 1) / 2) * scale, -(y - (this.store.height - 1) / 2) * scale];
   }
 
-  /** Angle and luminance of the photographs whose light stands near the plane, per unit of irradiance. */
+  #view(x: number, y: number): Vector {
+    const { view_direction, distance_mm, mm_per_px } = this.store.attributes.camera;
+    const towards = view_direction as Vector;
+    if (distance_mm === null || mm_per_px === null) return towards;
+    const place = towards.map((value) => value * distance_mm) as Vector;
+    return seenFrom(this.#place(x, y), { place, near: true }).direction;
+  }
+
+  /**
+   * Angle and luminance of the photographs whose light stands near the plane.
+   *
+   * A light whose position was stated counts as the pixel sees it, because curves are then of lights far away.
+   */
   async measured(x: number, y: number, azimuth: number): Promise<[number, number][]> {
-    const lights = this.store.attributes.photographs!.lights;
+    const place = this.#place(x, y);
+    const lights = this.store.attributes.photographs!.lights.map(({ direction, position_mm, intensity }) => {
+      const light = { place: (position_mm ?? direction) as Vector, near: position_mm !== null };
+      return { intensity, ...seenFrom(place, light) };
+    });
     const points: [number, number][] = [];
     const queue = [...lights.keys()].filter(
       (index) => angleInPlane(lights[index]!.direction, azimuth) !== null,
     );
     const work = async () => {
       for (let index = queue.shift(); index !== undefined; index = queue.shift()) {
-        const light = lights[index]!;
+        const { direction: towards, falloff, intensity } = lights[index]!;
         const layer = this.store.photograph(index);
         const codes = await this.#codes(layer, x, y);
-        const values = layer.columns.map((column, i) => decode(column, codes[i]!) / light.intensity[i]!);
-        points.push([angleInPlane(light.direction, azimuth)!, luminance(values)]);
+        const values = layer.columns.map((column, i) => decode(column, codes[i]!) / intensity[i]!);
+        points.push([angleInPlane(towards, azimuth)!, luminance(values) / falloff]);
       }
     };
     await Promise.all(Array.from({ length: AT_ONCE }, work));
@@ -204,7 +219,7 @@ export class Inspector {
 }
 
 function brightness(curve: readonly CurvePoint[]): [number, number][] {
-  return curve.map(({ angle, radiance }) => [angle, luminance(radiance)]);
+  return curve.map(({ angle, falloff, radiance }) => [angle, falloff * luminance(radiance)]);
 }
 
 /** The signed angle of a light in the plane of an azimuth, null where it stands too far out of it. */
