@@ -13,8 +13,10 @@ from impasto import store as stores
 from impasto.errors import StoreError
 from impasto.fit import FitOptions
 from impasto.fit.self_calibration import found_lights
+from impasto.geometry import Lights
 from impasto.light_distance import place_lights
 from impasto.pixels import read_pixels, render_pixels
+from impasto.render.display import requested_rendition
 from impasto.store.kinds import COUNT, NUMBER, each, numbers, record
 from store_files import attributes, change_attributes
 
@@ -70,6 +72,15 @@ def use_fit(store):
     assert sum(fit.attributes["pixels"].values()) >= 0
 
 
+def use_published(store):
+    fit, stack = stores.open_published(store, MODEL)
+    lights = Lights(("one",), [[0.6, 0.0, 0.8]])
+    requested_rendition(
+        stack, display="srgb", exposure=1.0, white_point=None, adaptation="cat16", highlights="clip"
+    )
+    render_pixels(read_pixels(fit, *TILE), lights, stack.camera)
+
+
 def places(value, at=()):
     """Yield where each entry of nested attributes stands, of lists the first."""
     if at:
@@ -105,32 +116,47 @@ def fault(use, store):
     return None
 
 
+@pytest.fixture(scope="module")
+def published(rich, tmp_path_factory):
+    """Return the published store of it."""
+    site = tmp_path_factory.mktemp("published") / "site"
+    impasto.publish(rich, site, models=[MODEL], photographs=1)
+    return site / "painting.zarr"
+
+
 @pytest.mark.parametrize(
-    ("group", "use", "fewest"),
-    [("stack", use_stack, 30), (f"fits/{MODEL}", use_fit, 30)],
-    ids=["stack", "fit"],
+    ("of", "group", "use", "fewest"),
+    [
+        ("rich", "stack", use_stack, 30),
+        ("rich", f"fits/{MODEL}", use_fit, 30),
+        ("published", "", use_published, 20),
+    ],
+    ids=["stack", "fit", "published"],
 )
-def test_whatever_is_wrong_is_told_with_its_name_or_does_no_harm(rich, group, use, fewest, monkeypatch):
-    found = attributes(rich / group)
+def test_whatever_is_wrong_is_told_with_its_name_or_does_no_harm(
+    of, group, use, fewest, monkeypatch, request
+):
+    store = request.getfixturevalue(of)
+    found = attributes(store / group)
     told = set()
     read_group = stores.hierarchy.read_group
 
     def changed_group(path):
-        return now if path == rich / group else read_group(path)
+        return now if path == store / group else read_group(path)
 
-    for module in (stores.stacks, stores.fits):
+    for module in (stores.stacks, stores.fits, stores.published):
         monkeypatch.setattr(module, "read_group", changed_group)
     now = found
-    use(rich)
+    use(store)
     for at, value in product(places(found), (KeyError, *WRONG)):
         now = changed(found, at, value)
-        if (error := fault(use, rich)) is None:
+        if (error := fault(use, store)) is None:
             continue
         assert isinstance(error, StoreError), f"{at} as {value!r}: {error!r}"
         names = [key for key in at if isinstance(key, str)]
-        assert re.search(rf"{names[0]}\b|not finished", str(error))
-        assert all("impasto" in problem.do for problem in error.problems)
-        assert all(problem.where.startswith(str(rich)) for problem in error.problems)
+        assert re.search(rf"{names[0]}\b|not finished|with schema|has no model", str(error))
+        assert all(re.search("impasto|ublish the painting", problem.do) for problem in error.problems)
+        assert all(problem.where.startswith(str(store)) for problem in error.problems)
         told.add(".".join(names))
     assert len(told) >= fewest, sorted(told)
 
@@ -158,6 +184,16 @@ def test_what_is_wrong_is_told_with_what_was_expected(painting, tmp_path):
         "the attribute light_rgb is [1.0, 1.0] of 2 entries, expected a list of 3 numbers",
         'the attribute scale is "1.0", expected a number',
     ]
+
+
+def test_parameters_other_than_those_published_are_told(published, tmp_path):
+    store = tmp_path / "p.zarr"
+    shutil.copytree(published, store)
+    change_attributes(store, lambda found: found["models"][0]["parameters"].pop())
+    with pytest.raises(
+        StoreError, match=r"models has as parameters normal, .*, expected the \d+ that are stored"
+    ):
+        use_published(store)
 
 
 def test_an_evaluation_that_is_damaged_is_told(rich, tmp_path):

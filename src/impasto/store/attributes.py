@@ -26,6 +26,10 @@ from impasto.store.kinds import (
 from impasto.store.layout import STATUS_MEANING
 
 _OBJECT = record({})
+_CAMERA = record(
+    {"view_direction": numbers(3), "distance_mm": or_null(POSITIVE), "mm_per_px": or_null(POSITIVE)}
+)
+_COLOUR = record({"matrix": numbers(3, None), "white_xyz": numbers(3), "source": TEXT})
 _MADE_BY = {"program": TEXT, "version": TEXT}
 
 
@@ -36,14 +40,15 @@ def attribute_problems(store: Path, group: str, attributes: Attributes, of: Kind
     ----------
     store : Path
     group : str
-        Path of the group.
+        Path of the group, "" for the root.
     attributes : dict
     of : callable
         What they have to be.
     do : str
         How to mend them.
     """
-    return [Problem(f"{store}: {group}/zarr.json", what, do) for what in of(attributes, "")]
+    where = f"{store}: {group}/zarr.json" if group else f"{store}: zarr.json"
+    return [Problem(where, what, do) for what in of(attributes, "")]
 
 
 def stack_kind(lights: int | None, channels: int | None, *, complete: bool) -> Kind:
@@ -59,12 +64,6 @@ def stack_kind(lights: int | None, channels: int | None, *, complete: bool) -> K
             "shift_px": numbers(2),
         },
     )
-    camera = {
-        "view_direction": numbers(3),
-        "distance_mm": or_null(POSITIVE),
-        "mm_per_px": or_null(POSITIVE),
-    }
-    colour = {"matrix": numbers(3, None), "white_xyz": numbers(3), "source": TEXT}
     return record(
         {
             **_MADE_BY,
@@ -72,14 +71,14 @@ def stack_kind(lights: int | None, channels: int | None, *, complete: bool) -> K
             "offset": NUMBER,
             "clip_level": each(or_null(NUMBER), channels),
             "noise": record(dict.fromkeys(("read", "photon", "relative"), NOT_NEGATIVE)),
-            "camera": record(camera),
+            "camera": _CAMERA,
             "inputs": each(photograph, lights),
             "settings_sha256": TEXT,
         },
         {
             "light_rgb": numbers(channels),
             "light_rgb_source": TEXT,
-            "camera_colour": or_null(record(colour)),
+            "camera_colour": or_null(_COLOUR),
             "white_reference": or_null(_OBJECT),
             "light_file": record({"file": TEXT}),
             "notes": each(TEXT),
@@ -174,10 +173,12 @@ def _residual(value: Any, name: str) -> Iterator[str]:
     found = value if isinstance(value, dict) else {}
     components = _count(found, "components")
     lights = len(found["direction"]) if isinstance(found.get("direction"), list) else None
+    # A published store has what each of 256 codes stands for.
+    values = {"table": numbers(256)} if "table" in found else {"step": numbers(components)}
     return record(
         {
             "components": COUNT,
-            "step": numbers(components),
+            **values,
             "toe": POSITIVE,
             "direction": numbers(lights, 3),
             "length": POSITIVE,
@@ -215,3 +216,51 @@ EVALUATION = record(
     {"as_photographed": or_null(_ERRORS), "shares": or_null(_SHARES)},
 )
 """What the attributes of an evaluation are."""
+
+_COLUMN = record(
+    {
+        **dict.fromkeys(("name", "units", "long_name"), TEXT),
+        "component": COUNT,
+        "transfer": one_of("linear", "log"),
+        **dict.fromkeys(("scale", "offset"), NUMBER),
+    }
+)
+
+
+def published_kind(attributes: Attributes) -> Kind:
+    """Return what those attributes of a published store are that renderings need."""
+    colour = attributes.get("light_rgb")
+    channels = len(colour) if isinstance(colour, list) else None
+
+    def columns(value: Any, name: str) -> Iterator[str]:
+        wrong = list(each(_COLUMN)(value, name))
+        yield from wrong
+        if wrong:
+            return
+        for quantity, count in (("normal", 2), ("diffuse", channels)):
+            found = [column["component"] for column in value if column["name"] == quantity]
+            if found != list(range(count or 0)):
+                yield f"the attribute {name} has components {found} of {quantity}, expected {count} in order"
+
+    def model(value: Any, name: str) -> Iterator[str]:
+        named = value.get("name") if isinstance(value, dict) else None
+        return record(
+            {
+                "name": TEXT,
+                "model": one_of(str(named)),
+                "index_of_refraction": POSITIVE,
+                "fresnel": one_of("facet", "element"),
+                "light_rgb": numbers(channels),
+                "parameters": columns,
+            },
+            {
+                "residual": or_null(_residual),
+                "self_calibration": record({}, {"distances": record({}, {"told": _told})}),
+                "sample": _SAMPLE,
+            },
+        )(value, name)
+
+    return record(
+        {"light_rgb": numbers(None), "camera": _CAMERA, "models": each(model)},
+        {"camera_colour": or_null(_COLOUR)},
+    )

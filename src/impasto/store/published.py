@@ -6,8 +6,8 @@ docs/store.md, section "Published stores", specifies the layout.
 from __future__ import annotations
 
 import gzip
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from impasto.errors import Problem, StoreError
+from impasto.errors import Problem, StoreError, raise_problems
 from impasto.geometry import Camera
 from impasto.store.array_reader import ArrayReader
 from impasto.store.arrays import array_document
+from impasto.store.attributes import attribute_problems, published_kind
 from impasto.store.files import reading
 from impasto.store.fits import Fit, Maps
 from impasto.store.hierarchy import Attributes, open_array, read_group
@@ -62,7 +63,8 @@ class PublishedFit(Fit):
 
     @cached_property
     def _columns(self) -> list[Parameter]:
-        return [Parameter(**column) for column in self.attributes["parameters"]]
+        names = [entry.name for entry in fields(Parameter)]
+        return [Parameter(*(column[name] for name in names)) for column in self.attributes["parameters"]]
 
     @cached_property
     def _packed(self) -> ArrayReader:
@@ -91,6 +93,11 @@ class PublishedFit(Fit):
     def read(self, rows: slice, columns: slice, names: Iterable[str] | None = None) -> Maps:
         """Return maps of a tile; see `Fit.read`. The codes of a residual term are uint8."""
         wanted = self.names if names is None else tuple(names)
+        stored = self._packed.shape[2]
+        if len(self._columns) != stored or not set(wanted) <= set(self.names):
+            there = ", ".join(column.name for column in self._columns) or "none"
+            what = f"the attribute models has as parameters {there}, expected the {stored} that are stored"
+            raise StoreError(Problem(f"{self.store}: zarr.json", what, _AGAIN))
         maps = unpack(self._codes(self.group, self._packed, rows, columns), self._columns)
         if RESIDUAL in wanted:
             maps[RESIDUAL] = self._codes(self._residual_path, self._residual, rows, columns)
@@ -118,7 +125,8 @@ class PublishedStack:
     @property
     def camera(self) -> Camera:
         """Where the camera stands."""
-        return Camera(**self.attributes["camera"])
+        camera = self.attributes["camera"]
+        return Camera(camera["view_direction"], camera["distance_mm"], camera["mm_per_px"])
 
     @property
     def light_rgb(self) -> NDArray[np.float64]:
@@ -138,14 +146,15 @@ def open_published(store: str | Path, model: str) -> tuple[PublishedFit, Publish
     Raises
     ------
     StoreError
-        If it is from a newer version, or does not hold the model.
+        If it is from a newer version, is damaged, or does not hold the model.
     """
     store = Path(store)
-    attributes: Mapping[str, Any] = read_group(store) or {}
+    attributes: Attributes = read_group(store) or {}
     schema = attributes.get("impasto_published")
     if not isinstance(schema, int) or schema > PUBLISHED_SCHEMA:
         what = f"is published with schema {schema}, and this version knows schemas up to {PUBLISHED_SCHEMA}"
         raise StoreError(Problem(str(store), what, "Use a newer version of impasto"))
+    raise_problems(StoreError, attribute_problems(store, "", attributes, published_kind(attributes), _AGAIN))
     models = {entry["name"]: entry for entry in attributes["models"]}
     if model not in models:
         what = f"has no model {model}; it has {', '.join(models) or 'none'}"
