@@ -11,7 +11,7 @@ import zarr
 import impasto
 from impasto.errors import OptionError
 from impasto.fit import FitOptions
-from impasto.light_strength import as_photographed
+from impasto.light_strength import scale_lights
 from impasto.store import open_stack, read_evaluation
 from impasto.store.borrow import borrowed_stack
 
@@ -127,7 +127,7 @@ def test_renderings_that_follow_the_lamps_strengths_are_judged_beside_those_that
     stack = open_stack(store)
     _, height, width, _ = stack.shape
     held = [stack.lights.names.index(name) for name in HELD]
-    stronger = as_photographed({"residual": term}, stack.lights.select(held)).intensity
+    stronger = scale_lights({"residual": term}, stack.lights.select(held)).intensity
     rms = []
     for photograph, rendering, strength in zip(
         stack.radiance(slice(0, height), slice(0, width), held),

@@ -17,7 +17,7 @@ from impasto.fit.light_process import LightProcess, compress, hull_of
 from impasto.fit.remainder import left_over
 from impasto.fit.strength import find_strength
 from impasto.geometry import Camera, Lights, arm_direction, dome_direction, zenith_azimuth
-from impasto.light_strength import as_photographed
+from impasto.light_strength import scale_lights
 from impasto.pixels import Pixels, near_positions_mm, render_pixels
 from impasto.residual import ZERO, ResidualTerm, encode, kernel, told
 from impasto.store import open_fit, open_stack
@@ -150,7 +150,7 @@ def test_added_as_docs_store_md_says(tabled):
     diffuse = RNG.uniform(0.0, 1.0, size=(7, 3))
     diffuse[3] = np.nan
     stated = Lights(("a", "b"), direction[:2], intensity=intensity)
-    got = rendered(flat(diffuse, codes), found, as_photographed({"residual": found}, stated))
+    got = rendered(flat(diffuse, codes), found, scale_lights({"residual": found}, stated))
     for place in np.ndindex(2, 7, 3):
         which, pixel, channel = place
         near = np.exp(-np.square(direction[which] - direction).sum(axis=1) / (2 * 0.4**2))
@@ -280,7 +280,7 @@ def test_strengths_that_have_nothing_to_do_with_direction_are_not_told():
 def strength_around(found, direction):
     """Return how strong the lights around directions (L, 3) were, by the attribute of a term."""
     stated = Lights(tuple(map(str, range(len(direction)))), direction)
-    return as_photographed({"residual": found}, stated).intensity
+    return scale_lights({"residual": found}, stated).intensity
 
 
 def plain_term(direction):

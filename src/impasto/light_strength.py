@@ -15,8 +15,8 @@ from impasto.geometry import Lights
 from impasto.residual import ResidualTerm, told
 
 
-def as_photographed(attributes: Mapping[str, Any], lights: Lights) -> Lights:
-    """Make lights as strong as a lamp held by hand was around them.
+def scale_lights(attributes: Mapping[str, Any], lights: Lights) -> Lights:
+    """Make lights as strong as the lamp of the photographs was around them, if a fit tells it.
 
     Parameters
     ----------
@@ -27,12 +27,12 @@ def as_photographed(attributes: Mapping[str, Any], lights: Lights) -> Lights:
     Returns
     -------
     Lights
-        As they are, where the fit does not tell how strong the lights around a direction were. Beyond the
-        hull of the lights that were fitted strengths fade to those stated, as the residual term does.
+        With intensities times exp(w(l) g(l)), g being the logarithm told for a light's direction l and w the
+        share of the residual term that is left there: beyond the hull of the fitted lights strengths fade to
+        those stated. `lights` itself, where the fit does not tell strengths.
     """
     term = ResidualTerm.of(attributes)
-    found = attributes["residual"].get("strength") if term else None
-    if term is None or found is None:
+    if term is None or not (found := attributes["residual"].get("strength")):
         return lights
     logarithm = told(found, lights.direction, term.direction) * term.share(lights.direction)[:, None]
     return replace(lights, intensity=lights.intensity * np.exp(logarithm))

@@ -22,7 +22,7 @@ from impasto.evaluate.results import LightErrors, ModelErrors, join_baselines, j
 from impasto.evaluate.shares import ErrorShares, Photographed, error_shares
 from impasto.fit import FitOptions, fit
 from impasto.geometry import Lights, zenith_azimuth
-from impasto.light_strength import as_photographed
+from impasto.light_strength import scale_lights
 from impasto.models import ModelSpec, parse_model
 from impasto.progress import progress
 from impasto.render import render_bands
@@ -211,19 +211,16 @@ def _judge(
             lights = stack.lights.select(np.asarray(held))
             errors, kept = _compare(fitted, stack, held, lights, show_progress)
             alone = followed = None
-            if residual := fitted.attributes.get("residual"):
-                without, _ = _compare(fitted, stack, held, lights, show_progress, residual=False)
-                alone = mean_errors([entry.errors for entry in without])
-                if "strength" in residual:
-                    strong = as_photographed(fitted.attributes, lights)
-                    following, _ = _compare(fitted, stack, held, strong, show_progress)
-                    followed = mean_errors([entry.errors for entry in following])
+            if fitted.attributes.get("residual"):
+                alone = _mean(_compare(fitted, stack, held, lights, show_progress, residual=False)[0])
+            if (scaled := scale_lights(fitted.attributes, lights)) is not lights:
+                followed = _mean(_compare(fitted, stack, held, scaled, show_progress)[0])
             result = ModelErrors(
                 model=spec.name,
                 procedure=str(fitted.attributes["procedure"]),
                 refitted=not unseen,
                 lights=errors,
-                mean=mean_errors([entry.errors for entry in errors]),
+                mean=_mean(errors),
                 without_residual=alone,
                 as_photographed=followed,
                 shares=_shares(fitted, stack, spec, options, held),
@@ -285,7 +282,7 @@ def _compare(
     *,
     residual: bool = True,
 ) -> tuple[tuple[LightErrors, ...], NDArray[np.float32]]:
-    """Compare renderings under lights with the held-out photographs; return these, thinned out, too."""
+    """Return how far renderings under lights are from the held-out photographs; and the renderings, thinned."""
     _, height, width, channels = stack.shape
     gathered = [ErrorAccumulator(height, width, channels) for _ in held]
     step = _step(stack)
@@ -311,6 +308,10 @@ def _compare(
         for index, name in enumerate(lights.names)
     )
     return errors, kept
+
+
+def _mean(errors: Sequence[LightErrors]) -> ImageErrors:
+    return mean_errors([entry.errors for entry in errors])
 
 
 def _step(stack: Stack) -> int:

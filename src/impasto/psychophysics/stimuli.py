@@ -17,7 +17,7 @@ from impasto.colour import quantise
 from impasto.colour.rendition import Rendition
 from impasto.errors import OptionError, Problem
 from impasto.images import write_png
-from impasto.light_strength import as_photographed
+from impasto.light_strength import scale_lights
 from impasto.render import render_bands
 from impasto.store import Fit, Stack
 
@@ -153,7 +153,7 @@ def renderings(fit: Fit, stack: Stack, view: View, lights: Sequence[int]) -> Ite
     for start in range(0, len(lights), _LIGHTS_AT_A_TIME):
         group = list(lights[start : start + _LIGHTS_AT_A_TIME])
         reduced = _Reduced(len(group), view, stack.shape[3])
-        under = as_photographed(fit.attributes, stack.lights.select(group))
+        under = scale_lights(fit.attributes, stack.lights.select(group))
         for band in render_bands(fit, under, stack.camera):
             reduced.add(band.rows, band.radiance)
         yield from reduced.result()

@@ -20,7 +20,7 @@ from impasto.colour.displays import Display
 from impasto.colour.rendition import Rendition, Shown
 from impasto.geometry import Camera, Lights
 from impasto.light_distance import without_distance
-from impasto.light_strength import as_photographed as strong_as_photographed
+from impasto.light_strength import scale_lights
 from impasto.models import parse_model
 from impasto.output import prepare_folder
 from impasto.pixels import read_pixels, render_pixels
@@ -190,7 +190,7 @@ def render(
     else:
         wanted = requested_lights(lights, light, arm, channels, stack.camera)
     if as_photographed:
-        wanted = strong_as_photographed(fit.attributes, wanted)
+        wanted = scale_lights(fit.attributes, wanted)
     if distant_light:
         fit = replace(fit, attributes=without_distance(fit.attributes))
     rendition = requested_rendition(
