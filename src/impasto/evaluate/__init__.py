@@ -282,7 +282,7 @@ def _compare(
     *,
     residual: bool = True,
 ) -> tuple[tuple[LightErrors, ...], NDArray[np.float32]]:
-    """Return how far renderings under lights are from the held-out photographs; and the renderings, thinned."""
+    """Return the errors of renderings of the held-out photographs under lights, and these thinned out."""
     _, height, width, channels = stack.shape
     gathered = [ErrorAccumulator(height, width, channels) for _ in held]
     step = _step(stack)
