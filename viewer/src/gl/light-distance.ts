@@ -18,7 +18,7 @@ export function placeLights<L extends Place>(
   const extent = Math.max(...size) * (camera.mm_per_px ?? 1);
   return lights.map((light) => {
     if (light.near) return light;
-    const own = found.table || found.weights ? told(found, found.direction ?? [], light.place)[0]! : 0;
+    const own = found.table || found.weights ? told(found, found.direction ?? [], light.place) : 0;
     const distance = found.distance * Math.exp(own) * extent;
     const [x, y, z] = light.place;
     return { ...light, place: [x * distance, y * distance, z * distance], near: true };

@@ -1,18 +1,17 @@
-/** What the photographs' lights tell of others, such as their distance: docs/store.md; src/impasto/residual.py. */
+/** What the photographs' lights tell of others, their distance: docs/store.md; src/impasto/residual.py. */
 
-import type { DirectionTable, Told } from "../store/attributes";
+import type { Told } from "../store/attributes";
 
 export const dot = (a: readonly number[], b: readonly number[]) =>
   a.reduce((sum, value, i) => sum + value * b[i]!, 0);
 
-/** Returns for each channel the logarithm told for a direction, a unit vector; `fitted` are the lights'. */
+/** Returns the logarithm told for a direction, a unit vector; `fitted` are the lights'. */
 export function told(
   { table, weights, length }: Told,
   fitted: readonly (readonly number[])[],
   direction: readonly number[],
-): number[] {
-  if (table) return lookUp(table, direction);
-  return weights!.map((channel) => kernelSum(channel, fitted, length!, direction));
+): number {
+  return table ? lookUp(table[0], direction) : kernelSum(weights![0], fitted, length!, direction);
 }
 
 /** Returns the sum over lights n of weight n times exp(−|l − dₙ|² / 2ℓ²), of unit vectors l and dₙ. */
@@ -28,9 +27,9 @@ export function kernelSum(
 }
 
 /** Returns what a table says of a direction, bilinear in both angles; azimuths go around. */
-function lookUp(table: DirectionTable, [x, y, z]: readonly number[]): number[] {
-  const rows = table[0]!.length;
-  const columns = table[0]![0]!.length;
+function lookUp(table: readonly (readonly number[])[], [x, y, z]: readonly number[]): number {
+  const rows = table.length;
+  const columns = table[0]!.length;
   const zenith = Math.min(Math.atan2(Math.hypot(x!, y!), z!) / (Math.PI / 2), 1) * (rows - 1);
   const azimuth = (Math.atan2(y!, x!) / (2 * Math.PI)) * columns;
   const row = Math.min(Math.floor(zenith), rows - 2);
@@ -39,5 +38,5 @@ function lookUp(table: DirectionTable, [x, y, z]: readonly number[]): number[] {
   const first = (column + columns) % columns;
   const second = (first + 1) % columns;
   const between = (values: readonly number[]) => values[first]! * (1 - along) + values[second]! * along;
-  return table.map((channel) => between(channel[row]!) * (1 - down) + between(channel[row + 1]!) * down);
+  return between(table[row]!) * (1 - down) + between(table[row + 1]!) * down;
 }

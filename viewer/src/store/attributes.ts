@@ -61,15 +61,14 @@ export interface ResidualTerm {
   readonly fade: number;
 }
 
-/** What lights tell of others, by a table; in older stores by a kernel's length and weights per channel. */
+/** What lights tell of others, in one channel: by a table; in older stores by a kernel's length and weights. */
 export interface Told {
-  readonly table?: DirectionTable;
+  /** By zenith angle from 0 to 90°, and azimuth. */
+  readonly table?: readonly [readonly (readonly number[])[]];
   readonly length?: number;
-  readonly weights?: readonly (readonly number[])[];
+  /** Of each light. */
+  readonly weights?: readonly [readonly number[]];
 }
-
-/** Values by channel, zenith angle from 0 to 90°, and azimuth. */
-export type DirectionTable = readonly (readonly (readonly number[])[])[];
 
 export interface PhotographLight {
   readonly name: string;
@@ -146,12 +145,10 @@ const vectors = (list: unknown) => Array.isArray(list) && list.every((each) => n
 
 /** Whether what so many lights tell has all its numbers. */
 function isTold({ table, weights, length }: Told, lights: number): boolean {
-  if (!table) return length! > 0 && weights?.length === 1 && numbers(weights[0]!, lights);
-  const rows = table[0]?.length ?? 0;
-  const columns = table[0]?.[0]?.length ?? 0;
-  const whole = (channel: DirectionTable[number]) =>
-    channel.length === rows && channel.every((row) => numbers(row, columns));
-  return table.length === 1 && rows > 1 && columns > 0 && table.every(whole);
+  if (!table) return length! > 0 && weights?.length === 1 && numbers(weights[0], lights);
+  const [rows] = table;
+  const columns = rows?.[0]?.length ?? 0;
+  return table.length === 1 && rows.length > 1 && columns > 0 && rows.every((row) => numbers(row, columns));
 }
 
 /** Whether a distance has all its numbers. */
