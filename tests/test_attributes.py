@@ -270,5 +270,8 @@ def test_kinds_accept_what_they_name():
         "the attribute p.tags[0] is true, expected a whole number from 0",
         "the attribute p.size is Infinity, expected a number",
     ]
+    assert list(numbers(None, 3)([], "q")) == [
+        "the attribute q is [] of 0 entries, expected a list of … x 3 numbers"
+    ]
     (long,) = numbers(3)([1, 2, "a" * 100], "list")
     assert len(long) < 110

@@ -52,7 +52,7 @@ def or_null(of: Kind) -> Kind:
 
 def numbers(*shape: int | None) -> Kind:
     """Return the kind of nested lists of numbers, with None for lengths that may be any."""
-    lengths = " x ".join("any number" if length is None else str(length) for length in shape)
+    lengths = " x ".join("…" if length is None else str(length) for length in shape)
 
     def accepts(value: Any) -> bool:
         try:
