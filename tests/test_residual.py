@@ -14,6 +14,7 @@ from impasto.direction_table import look_up, node_directions
 from impasto.errors import OptionError
 from impasto.fit import FitOptions
 from impasto.fit.light_process import LightProcess, compress, hull_of
+from impasto.fit.notes import residual_notes
 from impasto.fit.remainder import left_over
 from impasto.fit.strength import find_strength
 from impasto.geometry import Camera, Lights, arm_direction, dome_direction, zenith_azimuth
@@ -275,6 +276,13 @@ def test_strengths_that_have_nothing_to_do_with_direction_are_not_told():
     rng = np.random.default_rng(11)
     draws = [find_strength(lights(40), rng.normal(0.0, 0.1, (40, 1)) + np.zeros(3)) for _ in range(50)]
     assert sum(each is not None for each in draws) <= 2
+
+
+def test_a_fit_says_where_renderings_could_follow_the_lamp():
+    errors = {"model": 30.0, "with_residual": 36.0}
+    found = {"left_out_db": errors, "length": 0.3, "noise": 0.1, "components": 18, "kept": 0.9}
+    assert len(residual_notes(found)) == 1
+    assert "--as-photographed" in residual_notes({**found, "strength": {}})[1]
 
 
 def strength_around(found, direction):

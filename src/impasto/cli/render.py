@@ -35,11 +35,14 @@ def render(
     ] = None,
     as_photographed: Annotated[
         bool,
-        typer.Option("--as-photographed", help="Lights as strong as a lamp held by hand was around them."),
+        typer.Option(
+            "--as-photographed",
+            help="Lights as strong as the photographs' lamp was around them, to compare with photographs.",
+        ),
     ] = False,
     distant_light: Annotated[
         bool,
-        typer.Option("--distant-light", help="Lights far away though those of the photographs were near."),
+        typer.Option("--distant-light", help="Light from far away where the photographs' lamps stood near."),
     ] = False,
     display: Annotated[
         str, typer.Option("--display", metavar="NAME|FILE", help="srgb, display-p3 or an ICC profile.")

@@ -58,13 +58,18 @@ def _distance_notes(found: dict[str, Any]) -> tuple[str, ...]:
 
 
 def residual_notes(found: dict[str, Any]) -> tuple[str, ...]:
-    """Return what the residual term brings; `found` are `Remainder.attributes`."""
+    """Return what the residual term brings; `found` is the attribute ``residual`` of the fit."""
     error = found["left_out_db"]
+    strength = (
+        "residual: neighbouring lights tell how strong the lamp was around a direction. Renderings are under "
+        "lights as strong as stated, and follow the lamp with render --as-photographed",
+    )
     return (
         f"residual: lights left out one by one are met to {error['with_residual']:.1f} dB instead of the "
         f"model's {error['model']:.1f} dB, with length {found['length']:.2g} and noise {found['noise']:.2g}; "
         f"{found['components']} components keep {100 * found['kept']:.1f} % of it. Outside the hull of the "
         "lights it fades to nothing",
+        *(strength if "strength" in found else ()),
     )
 
 
