@@ -48,6 +48,22 @@ def test_few_lights_leave_out_what_they_cannot_tell():
     assert "HSH order 2" not in names
 
 
+@pytest.mark.parametrize("azimuth", [0.0, 0.7])
+def test_splines_of_lights_on_an_arm_curve_along_it_alone(azimuth):
+    arm = dome_direction(np.radians(np.linspace(-70, 70, 15)), azimuth)
+    seen, wanted = np.delete(arm, 6, axis=0), arm[6:7]
+    (method,) = [method for method in methods(seen, wanted) if method.name == "RBF (thin plate)"]
+    lines = (0.3 + seen[:, :2]).astype(np.float32)[:, None]
+    np.testing.assert_allclose(method.predict(lines)[:, 0], 0.3 + wanted[:, :2], atol=1e-5)
+    np.testing.assert_allclose(method.predict(seen[:, None])[:, 0], wanted, atol=2e-3)
+
+
+def test_splines_take_the_mean_of_two_photographs_under_one_light():
+    twice = np.vstack([SEEN[:8], SEEN[:1]])
+    (method,) = [method for method in methods(twice, SEEN[:1]) if method.name == "RBF (thin plate)"]
+    np.testing.assert_allclose(method.weights, [[0.5, 0, 0, 0, 0, 0, 0, 0, 0.5]], atol=1e-9)
+
+
 def test_held_out_photographs_do_not_enter(painting):
     held = ("light-003", "light-009")
     summary = impasto.evaluate(painting, models=["lambert"], held_out_lights=held)

@@ -101,9 +101,18 @@ def _least_squares(basis: Callable[[Array], Array], seen: Array, wanted: Array) 
 
 
 def _splines(seen: Array, wanted: Array) -> Array:
-    from scipy.interpolate import RBFInterpolator
+    """Return the weights of thin plate splines; of lights on a line or in one place, those of least norm."""
+    from scipy.special import xlogy
 
-    found: Array = RBFInterpolator(seen[:, :2], np.eye(len(seen)), kernel="thin_plate_spline")(wanted[:, :2])
+    def terms(direction: Array) -> Array:
+        squares = np.square(direction[:, None, :2] - seen[:, :2]).sum(axis=-1)
+        return np.hstack([xlogy(squares, squares), np.ones((len(direction), 1)), direction[:, :2]])
+
+    count = len(seen)
+    system = np.zeros((count + 3, count + 3))
+    system[:count] = terms(seen)
+    system[count:, :count] = system[:count, count:].T
+    found: Array = terms(wanted) @ np.linalg.pinv(system, rcond=1e-10, hermitian=True)[:, :count]
     return found
 
 
