@@ -189,10 +189,12 @@ def test_what_is_wrong_is_told_with_what_was_expected(painting, tmp_path):
 def test_parameters_other_than_those_published_are_told(published, tmp_path):
     store = tmp_path / "p.zarr"
     shutil.copytree(published, store)
+    change_attributes(store, lambda found: found["models"][0]["parameters"][-1].update(name="other"))
+    expected = r"\), expected the 7 that are stored, with c\. Publish"
+    with pytest.raises(StoreError, match=r"has 7 parameters \(normal, .*, specular, other" + expected):
+        use_published(store)
     change_attributes(store, lambda found: found["models"][0]["parameters"].pop())
-    with pytest.raises(
-        StoreError, match=r"models has as parameters normal, .*, expected the \d+ that are stored"
-    ):
+    with pytest.raises(StoreError, match=r"has 6 parameters \(normal, .*, specular" + expected):
         use_published(store)
 
 

@@ -145,6 +145,8 @@ def photographs(stack: Stack, view: View, lights: Sequence[int]) -> Iterator[NDA
 def renderings(fit: Fit, stack: Stack, view: View, lights: Sequence[int]) -> Iterator[NDArray[np.float32]]:
     """Yield what a fit shows under the lights of photographs; see `photographs`.
 
+    Where the fit tells how strong the lamp was around a light, renderings follow it.
+
     Raises
     ------
     StoreError

@@ -93,10 +93,11 @@ class PublishedFit(Fit):
     def read(self, rows: slice, columns: slice, names: Iterable[str] | None = None) -> Maps:
         """Return maps of a tile; see `Fit.read`. The codes of a residual term are uint8."""
         wanted = self.names if names is None else tuple(names)
-        stored = self._packed.shape[2]
-        if len(self._columns) != stored or not set(wanted) <= set(self.names):
-            there = ", ".join(column.name for column in self._columns) or "none"
-            what = f"the attribute models has as parameters {there}, expected the {stored} that are stored"
+        stored, missing = self._packed.shape[2], sorted({*wanted} - {*self.names})
+        if len(self._columns) != stored or missing:
+            there = f"{len(self._columns)} parameters ({', '.join(column.name for column in self._columns)})"
+            expected = f"the {stored} that are stored" + f", with {', '.join(missing)}" * bool(missing)
+            what = f"the attribute models has {there}, expected {expected}"
             raise StoreError(Problem(f"{self.store}: zarr.json", what, _AGAIN))
         maps = unpack(self._codes(self.group, self._packed, rows, columns), self._columns)
         if RESIDUAL in wanted:
