@@ -375,9 +375,14 @@ def test_renderings_follow_the_lamps_strengths_only_where_they_are_asked_to(pain
     group.attrs["residual"] = found
     light = (20.0, 60.0)
     images = []
+    untold = impasto.render(
+        painting, model=MODEL, light=[light], out=tmp_path / "untold", raw=True, as_photographed=True
+    )
+    assert untold.lamp_untold
     for follow in (True, False):
         out = tmp_path / str(follow)
-        impasto.render(store, model=MODEL, light=[light], out=out, raw=True, as_photographed=follow)
+        done = impasto.render(store, model=MODEL, light=[light], out=out, raw=True, as_photographed=follow)
+        assert not done.lamp_untold
         images.append(oiio.ImageInput.open(str(out / "1.exr")).read_image("float"))
     stronger = strength_around(found, dome_direction(*np.radians([light]).T))
     assert stronger.min() > 1.05

@@ -75,6 +75,9 @@ class RenderSummary:
         Pixels without a fit: NaN in the EXR files, black on display.
     matte_pixels : int
         Pixels of which the highlight is not identified, rendered with their diffuse term alone.
+    lamp_untold : bool
+        Whether lights are as strong as stated although they were to be so as photographed, because the fit
+        does not tell how strong the lamp was.
     too_bright : float
         Largest share, over the lights, of pixels brighter than the display's white.
     out_of_gamut : float
@@ -95,6 +98,7 @@ class RenderSummary:
     highlights: str
     missing_pixels: int
     matte_pixels: int
+    lamp_untold: bool
     too_bright: float
     out_of_gamut: float
     seconds: float
@@ -189,6 +193,7 @@ def render(
         wanted = lights
     else:
         wanted = requested_lights(lights, light, arm, channels, stack.camera)
+    stated = wanted
     if as_photographed:
         wanted = scale_lights(fit.attributes, wanted)
     if distant_light:
@@ -253,6 +258,7 @@ def render(
         highlights=highlights,
         missing_pixels=missing,
         matte_pixels=matte,
+        lamp_untold=as_photographed and wanted is stated,
         too_bright=too_bright,
         out_of_gamut=out_of_gamut,
         seconds=time.perf_counter() - started,

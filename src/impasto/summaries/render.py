@@ -23,6 +23,8 @@ def render_lines(summary: RenderSummary) -> Iterator[str]:
             f"shown on {summary.display} at exposure {summary.exposure:g}, white x {x:.4f} y {y:.4f} adapted "
             f"by {summary.adaptation}; camera colour: {summary.camera_colour}"
         )
+    if summary.lamp_untold:
+        yield "the fit does not tell how strong the lamp was: the lights are as strong as stated"
     if summary.too_bright > 0:
         rule = "cut" if summary.highlights == "clip" else "compressed by a soft shoulder"
         yield (
