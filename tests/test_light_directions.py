@@ -40,7 +40,7 @@ def misstated(relief, tmp_path, error_deg):
 
 
 def directions_found(store, **options):
-    impasto.fit(store, models=[MODEL], options=FitOptions(self_calibrate=True, **options))
+    impasto.fit(store, models=[MODEL], options=FitOptions(self_calibrate=True, **options), overwrite=True)
     return fit_attributes(store, MODEL)["self_calibration"].get("directions")
 
 
@@ -64,6 +64,22 @@ def test_directions_that_were_far_off_are_found_too(relief, tmp_path):
     found = directions_found(store)
     assert found["used"]
     assert error_deg(found["corrected"], true) < 0.6 * before
+
+
+def test_lights_that_were_all_rotated_are_rotated_back(relief, tmp_path, monkeypatch):
+    store, true = misstated(relief, tmp_path, 1.5)
+    direction = zarr.open_array(store / "stack" / "light_direction", mode="r+")
+    cosine, sine = np.cos(np.radians(2.0)), np.sin(np.radians(2.0))
+    direction[...] = direction[...] @ [[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]]
+
+    def left_deg(found):
+        across = np.cross(true, found)[:, 2].sum() / np.square(true[:, :2]).sum()
+        return np.degrees(across)
+
+    assert abs(left_deg(directions_found(store)["corrected"])) < 0.6
+    calibration = sys.modules["impasto.fit.self_calibration"]
+    monkeypatch.setattr(calibration, "find_rotation", lambda *_: 0.0)
+    assert left_deg(directions_found(store)["corrected"]) > 1.5
 
 
 def test_far_turns_need_a_large_gain(relief, tmp_path, monkeypatch):

@@ -207,9 +207,9 @@ class Joint:
         """Fit every few pixels, and keep what they show."""
         sharing = Sharing(self.model)
         title = "Looking for highlights"
-        for part in grid_pixels(self._stack, self.lights, SHARING_STEP, title, show_progress):
-            fit = self._fitting(part.values, part.row, part.column, self._selected)
-            sharing.add(fit(belief=sharing.doubt(fit())), part.row, part.column)
+        for values, row, column in grid_pixels(self._stack, self.lights, SHARING_STEP, title, show_progress):
+            fit = self._fitting(values, row, column, self._selected)
+            sharing.add(fit(belief=sharing.doubt(fit())), row, column)
         return sharing
 
     def _calibrate(self, sample: _SampledPixels) -> Calibration:
@@ -328,6 +328,12 @@ class _SampledPixels:
 
     def clipped(self) -> NDArray[np.bool_]:
         return self.procedure.clipped(self.measured())
+
+    def crosses(self) -> NDArray[np.float32]:
+        measured = self.procedure.measured(self.sample.crosses)
+        measured[self.procedure.clipped(measured)] = np.nan
+        grey: NDArray[np.float32] = measured.mean(axis=3)
+        return grey
 
     @property
     def extent_mm(self) -> float:

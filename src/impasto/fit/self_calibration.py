@@ -17,6 +17,7 @@ from impasto.fit.choice import WORTH_DB, choose
 from impasto.fit.light_directions import MIN_LIGHTS, USUAL_ERROR_DEG, correct_directions
 from impasto.fit.light_distances import find_distances
 from impasto.fit.light_evidence import least_radiance, log_ratio
+from impasto.fit.light_rotation import find_rotation, rotated
 from impasto.fit.strength import find_strength
 from impasto.fit.trend import find_trend
 from impasto.geometry import Array, Lights, degrees_between
@@ -41,6 +42,9 @@ class PixelFit(Protocol):
 
     def clipped(self) -> NDArray[np.bool_]:
         """Return which samples (L, N, C) are clipped."""
+
+    def crosses(self) -> Values:
+        """Return the radiance (L, M, 4) around other pixels, NaN where not known; see `find_rotation`."""
 
     @property
     def extent_mm(self) -> float:
@@ -144,6 +148,8 @@ def self_calibrate(
         return stated
     placed = replace(stated.lights, intensity=lights.intensity)
     corrected = find_strengths(pixels, correct_directions(thinned, placed))
+    rotation = find_rotation(pixels.crosses(), corrected.lights, USUAL_ERROR_DEG)
+    corrected = replace(corrected, lights=rotated(corrected.lights, rotation))
     ways = {"stated": stated, "corrected": corrected}
     turned = degrees_between(lights.direction, corrected.lights.direction)
     # The further lights turn, the less likely is it that they were stated so badly.
@@ -153,6 +159,7 @@ def self_calibrate(
         "used": choice.used == "corrected",
         "left_out_db": choice.left_out_db,
         "turned_deg": np.round(turned, 3).tolist(),
+        "rotated_deg": round(float(np.degrees(rotation)), 3),
         "corrected": np.round(corrected.lights.direction, 6).tolist(),
     }
     return replace(ways[choice.used], directions=found, distances=stated.distances)
