@@ -264,6 +264,40 @@ def test_arrays_of_another_shape_or_type_are_told(painting, tmp_path, name, meta
         stores.open_stack(store).lights  # noqa: B018
 
 
+@pytest.mark.parametrize(
+    ("name", "metadata", "what"),
+    [
+        ("status", {"shape": [4, 5]}, r"is uint8 of shape \(4, 5\), expected uint8 of shape"),
+        ("c", {"shape": [10**9, 10**9]}, "expected float32 of shape"),
+        ("c", {"data_type": "int32"}, "is int32 of shape .* expected float32"),
+        ("residual", {"data_type": "int16"}, "is int16 of shape .* expected uint16"),
+        ("status", None, "lacks the map status"),
+        ("residual", None, "lacks the map residual"),
+        ("c", None, "lacks the map c"),
+    ],
+)
+def test_maps_that_are_missing_or_of_another_kind_are_told(rich, tmp_path, name, metadata, what):
+    store = tmp_path / "p.zarr"
+    shutil.copytree(rich, store)
+    folder = store / "fits" / MODEL / name
+    document = folder / "zarr.json"
+    if metadata is None:
+        shutil.rmtree(folder)
+    else:
+        document.write_text(json.dumps(json.loads(document.read_text()) | metadata))
+    with pytest.raises(StoreError, match=f"fits/{MODEL}.*{what}.*--overwrite"):
+        impasto.render(store, model=MODEL, light=[(30, 40)], out=tmp_path / "out", raw=True)
+
+
+def test_highlights_of_another_colour_do_not_turn_white_where_their_map_is_lost(rich, tmp_path):
+    store = tmp_path / "p.zarr"
+    shutil.copytree(rich, store)
+    change_attributes(store / "fits" / MODEL, lambda found: found.update(highlight_colour={"used": "own"}))
+    shutil.rmtree(store / "fits" / MODEL / "specular_rgb", ignore_errors=True)
+    with pytest.raises(StoreError, match="lacks the map specular_rgb"):
+        stores.open_fit(store, MODEL)
+
+
 def test_kinds_accept_what_they_name():
     point = record({"at": numbers(2), "tags": each(COUNT)}, {"size": NUMBER})
     assert list(point({"at": [1, 2.5], "tags": [], "more": None}, "")) == []

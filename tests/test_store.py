@@ -83,6 +83,14 @@ def painting(tmp_path, rng):
     return path, pixels, make_fit(path, rng)
 
 
+@pytest.fixture
+def fitted(tmp_path, rng):
+    """Return a store with a fit of several units, and its maps."""
+    path = tmp_path / "painting.zarr"
+    make_stack(path, np.ones((4, 1100, 1050, 3), np.uint16))
+    return path, make_fit(path, rng)
+
+
 def test_a_stack_is_read_as_written(painting):
     path, pixels, _ = painting
     stack = stores.open_stack(path)
@@ -119,8 +127,8 @@ def test_float_stacks_keep_missing_samples(tmp_path, rng):
     np.testing.assert_array_equal(stores.read_stack(tmp_path / "s", slice(0, 40), slice(0, 30)), pixels)
 
 
-def test_a_fit_is_read_as_written(painting):
-    path, _, maps = painting
+def test_a_fit_is_read_as_written(fitted):
+    path, maps = fitted
     rows, columns = slice(1000, 1100), slice(1000, 1050)
     tile = stores.read_fit(path, "phong", rows, columns)
     assert set(tile) == set(maps)
@@ -198,8 +206,8 @@ def test_all_damaged_photographs_are_named_at_once(painting):
 
 
 @pytest.mark.parametrize("position", [20, -3])
-def test_a_flipped_byte_of_a_map_is_found(painting, position):
-    path, *_ = painting
+def test_a_flipped_byte_of_a_map_is_found(fitted, position):
+    path, _ = fitted
     flip_byte(path / "fits" / "phong" / "diffuse" / "c" / "1" / "0" / "0", position)
     for rows in (slice(0, 1100), slice(1030, 1040)):
         with pytest.raises(StoreError, match=r"fits/phong/diffuse.*damaged"):

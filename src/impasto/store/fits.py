@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, ExitStack, suppress
 from dataclasses import dataclass, field
@@ -36,6 +36,8 @@ from impasto.store.layout import (
     FITS,
     INNER_CHUNK,
     PYRAMIDS,
+    RESIDUAL,
+    STACK,
     UNIT,
     ZSTD,
     Map,
@@ -300,12 +302,24 @@ class Fit:
     @property
     def shape(self) -> tuple[int, int]:
         """Height and width in pixels."""
-        height, width = self._arrays["status"].shape
+        height, width = self.array("status").shape
         return height, width
+
+    def array(self, name: str) -> ArrayReader:
+        """Return the array of a map.
+
+        Raises
+        ------
+        StoreError
+            If it is not there.
+        """
+        if name not in self._arrays:
+            raise StoreError(Problem(f"{self.store}: {self.group}", f"lacks the map {name}", _AGAIN))
+        return self._arrays[name]
 
     def map_attributes(self, name: str) -> tuple[Attributes, int]:
         """Return the attributes of a map, and how many values it has per pixel."""
-        array = self._arrays[name]
+        array = self.array(name)
         return array.attributes, array.shape[2] if len(array.shape) > 2 else 1
 
     def read(self, rows: slice, columns: slice, names: Iterable[str] | None = None) -> Maps:
@@ -331,10 +345,11 @@ class Fit:
         tile = {}
         for name in self.names if names is None else names:
             path = f"{self.group}/{name}"
-            if self._arrays[name].lost(rows, columns):
+            array = self.array(name)
+            if array.lost(rows, columns):
                 raise StoreError(Problem(f"{self.store}: {path}", "has lost a part of its pixels", _AGAIN))
             with reading(self.store, path, _AGAIN):
-                tile[name] = self._arrays[name].read(rows, columns)
+                tile[name] = array.read(rows, columns)
         return tile
 
 
@@ -378,9 +393,42 @@ def open_fit(store: str | Path, model: str, level: int = 0) -> Fit:
                 do="Run the same impasto fit command again: it goes on from there",
             )
         )
-    if level == 0:
-        raise_problems(StoreError, fit_problems(store, model, attributes))
-    return Fit(store, group, attributes)
+    finest = attributes if level == 0 else read_group(store / fit_group(model)) or {}
+    raise_problems(StoreError, fit_problems(store, model, finest))
+    fit = Fit(store, group, attributes)
+    raise_problems(StoreError, _map_problems(fit, finest, level))
+    return fit
+
+
+def _map_problems(fit: Fit, attributes: Attributes, level: int) -> Iterator[Problem]:
+    """Yield which maps are missing, of another type, or of another size than the photographs."""
+    channels, term = len(attributes["light_rgb"]), attributes.get(RESIDUAL)
+    lengths = {"normal": 3, **dict.fromkeys(("diffuse", "ambient", "specular_rgb"), channels)}
+    needed = {"normal", "diffuse", "status"}
+    if term is not None:
+        lengths[RESIDUAL] = term["components"]
+        needed.add(RESIDUAL)
+    chosen = attributes.get("highlight_colour", {"used": attributes["options"].get("highlight_colour")})
+    if chosen["used"] == "own" and channels > 1 and "specular" in fit.names:
+        needed.add("specular_rgb")
+    size = _size(fit.store, level) or fit.shape
+    for name in sorted(needed.union(fit.names)):
+        array = fit.array(name)
+        shape = (*size, *([lengths[name]] if name in lengths else array.shape[2:]))
+        dtype = np.dtype({"status": "uint8", RESIDUAL: "uint16"}.get(name, "float32"))
+        if (array.shape, array.dtype) != (shape, dtype):
+            what = f"is {array.dtype} of shape {array.shape}, expected {dtype} of shape {shape}"
+            yield Problem(f"{fit.store}: {fit.group}/{name}", what, _AGAIN)
+
+
+def _size(store: Path, level: int) -> tuple[int, int] | None:
+    """Return height and width of a level by the photographs, None where the store does not have them."""
+    path = f"{STACK}/radiance"
+    shape = open_array(store, path).shape if has_array(store, path) else ()
+    if len(shape) != 4:
+        return None
+    height, width = (-(-length // 2**level) for length in shape[1:3])
+    return height, width
 
 
 def fitted_models(store: str | Path) -> list[str]:
