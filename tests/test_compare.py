@@ -52,6 +52,11 @@ def test_the_ratio_is_the_mean_of_the_pixels_ratios(painting, compared):
     assert told.low <= told.median <= told.high
 
 
+def test_a_model_that_is_named_twice_counts_once(painting, compared):
+    summary = impasto.compare(painting, models=["torrance-sparrow", "phong", "phong-ambient"])
+    assert summary.regions == compared.regions
+
+
 def test_pixels_choose_one_model_each(painting, compared):
     assert sum(model.chosen for model in compared.regions[0].models) == pytest.approx(1)
     choice = tifffile.imread(compared.files[0])

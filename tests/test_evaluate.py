@@ -2,6 +2,7 @@
 
 import importlib
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,6 +38,25 @@ def test_nothing_but_the_result_is_added_to_the_store(painting):
     assert entry["errors"]["rms_relative"] == summary.models[0].mean.rms_relative
     assert kept.attributes["options"]["exclude"] == list(summary.held_out)
     assert kept.attributes["stack_sha256"] == open_stack(painting).sha256
+
+
+def test_a_store_that_may_only_be_read_is_judged_all_the_same(painting, tmp_path, monkeypatch):
+    store = tmp_path / "p.zarr"
+    shutil.copytree(painting, store)
+    first = impasto.evaluate(store, models=["phong"], held_out=1, baselines=False)
+    assert first.not_recorded == ""
+    before, unlink = listing(store), Path.unlink
+
+    def refuse(path, missing_ok=False):
+        if path.is_relative_to(store):
+            raise PermissionError(13, "Permission denied", str(path))
+        unlink(path, missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    again = impasto.evaluate(store, models=["phong"], held_out=1, baselines=False)
+    assert again.models == first.models
+    assert "evaluations/phong/zarr.json: cannot be written" in again.not_recorded
+    assert listing(store) == before
 
 
 def test_the_renderings_that_are_kept_are_those_that_were_compared(painting):

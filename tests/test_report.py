@@ -164,4 +164,6 @@ def test_what_cannot_be_reported_is_refused_before_the_work(painting, tmp_path):
         impasto.report(painting, tmp_path / "r.html", models=["lambert"])
     with pytest.raises(OptionError, match="no reflectance model"):
         impasto.report(painting, tmp_path / "r.html", models=["gloss"])
+    with pytest.raises(StoreError, match="no such store"):
+        impasto.report(tmp_path / "none.zarr", tmp_path / "r.html")
     assert list(tmp_path.iterdir()) == []

@@ -6,6 +6,7 @@ here are read from that list.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -111,6 +112,11 @@ def parse_model(name: str) -> ModelSpec:
             do=f"Choose one of {', '.join(MODELS)}",
         )
     )
+
+
+def parse_models(names: Iterable[str]) -> list[ModelSpec]:
+    """Return the models with some names, each once; errors as for `parse_model`."""
+    return list(dict.fromkeys(map(parse_model, names)))
 
 
 def with_ambient(model: ModelSpec, ambient: bool) -> ModelSpec:

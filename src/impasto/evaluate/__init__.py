@@ -23,7 +23,7 @@ from impasto.evaluate.shares import ErrorShares, Photographed, error_shares
 from impasto.fit import FitOptions, fit
 from impasto.geometry import Lights, zenith_azimuth
 from impasto.light_strength import scale_lights
-from impasto.models import ModelSpec, parse_model
+from impasto.models import ModelSpec, parse_models
 from impasto.progress import progress
 from impasto.render import render_bands
 from impasto.store import (
@@ -132,7 +132,7 @@ def evaluate(
     """
     started = time.perf_counter()
     path = Path(store)
-    specs = [parse_model(name) for name in models or fitted_models(path) or _DEFAULT_MODELS]
+    specs = parse_models(models or fitted_models(path) or _DEFAULT_MODELS)
     stack = open_stack(path)
     rounds = _rounds(stack.lights, held_out, held_out_lights, folds)
     judged = [_judge(stack, specs, held, baselines, folds is None, show_progress) for held in rounds]

@@ -10,17 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-from impasto.errors import OptionError, Problem
+from impasto.errors import OptionError, Problem, StoreError, raise_problems
 from impasto.evaluate.clusters import choose_regions, write_regions
 from impasto.evaluate.regions import WHOLE, sample_regions
 from impasto.evaluate.tally import RegionComparison, Tally, specular_ratio
 from impasto.images import write_tiff
 from impasto.maps.pictures import draw_status
-from impasto.models import parse_model
+from impasto.models import parse_models
 from impasto.output import prepare_folder
 from impasto.pixels import read_pixels
 from impasto.progress import progress
-from impasto.store import fitted_models, open_fit, open_stack
+from impasto.store import fitted_models, open_fit, open_stack, source_problems
 
 _TILE_ROWS, _TILE_COLUMNS = 128, 512
 _SAMPLED = 20_000
@@ -115,7 +115,7 @@ def compare(
     started = time.perf_counter()
     path = Path(store)
     stack = open_stack(path)
-    names = [parse_model(name).name for name in models] or ordered_fits(path)
+    names = [spec.name for spec in parse_models(models)] or ordered_fits(path)
     fits = {name: open_fit(path, name) for name in names}
     _, height, width, channels = stack.shape
     divided = choose_regions(fits[names[0]], regions, clusters, show=show_progress)
@@ -179,7 +179,10 @@ def ordered_fits(store: Path) -> list[str]:
     ------
     OptionError
         If there is none.
+    StoreError
+        If there is no such store.
     """
+    raise_problems(StoreError, source_problems(store))
     names = sorted(fitted_models(store), key=lambda name: (not name.startswith("torrance-sparrow"), name))
     if not names:
         raise OptionError(

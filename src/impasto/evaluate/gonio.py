@@ -20,7 +20,7 @@ from impasto.evaluate.curve_plot import draw_curve
 from impasto.evaluate.curves import Curve, CurveSums, columns
 from impasto.evaluate.regions import WHOLE, Regions, check_inside, sample_regions
 from impasto.evaluate.telling import telling_pixels
-from impasto.models import parse_model
+from impasto.models import parse_models
 from impasto.output import prepare_folder, write_text
 from impasto.pixels import read_pixels
 from impasto.progress import progress
@@ -97,7 +97,7 @@ def gonio(
     started = time.perf_counter()
     path = Path(store)
     stack = open_stack(path)
-    names = [parse_model(name).name for name in models] or ordered_fits(path)
+    names = [spec.name for spec in parse_models(models)] or ordered_fits(path)
     fits = {name: open_fit(path, name) for name in names}
     height, width = stack.shape[1:3]
     check_inside(pixels, height, width)

@@ -25,7 +25,7 @@ from impasto.evaluate.glossmeter import GLOSSMETERS
 from impasto.fit.pyramid import halve
 from impasto.light_distance import only_told
 from impasto.maps.integration import integrate_normals
-from impasto.models import MODELS, parse_model
+from impasto.models import MODELS, parse_model, parse_models
 from impasto.publish.arrays import Codes, PackedArray, pixels_of
 from impasto.publish.photographs import photograph_arrays, spread
 from impasto.publish.residual import PackedResidual
@@ -105,7 +105,7 @@ class Publication:
         title: str | None = None,
     ) -> None:
         stack = open_stack(store)
-        names = [parse_model(name).name for name in models] or _by_usefulness(fitted_models(store))
+        names = [spec.name for spec in parse_models(models)] or _by_usefulness(fitted_models(store))
         if not names:
             raise OptionError(
                 Problem(str(store), "has no complete fit to show", f"Fit one: impasto fit {store}")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from impasto.errors import OutputError, Problem
 from impasto.evaluate.compare import ordered_fits
-from impasto.models import parse_model
+from impasto.models import parse_models
 from impasto.page import Page
 from impasto.progress import progress
 from impasto.report.sections import SECTIONS, section_of
@@ -84,7 +84,7 @@ def report(
     """
     started = time.perf_counter()
     path, page_path = Path(store), Path(out)
-    names = tuple(dict.fromkeys(parse_model(name).name for name in models)) or tuple(ordered_fits(path))
+    names = tuple([spec.name for spec in parse_models(models)] or ordered_fits(path))
     for name in names:
         open_fit(path, name)
     _check_target(page_path)

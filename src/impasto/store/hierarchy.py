@@ -120,16 +120,18 @@ def remove(store: Path, *paths: str) -> None:
     Raises
     ------
     StoreError
-        If `store` is not an impasto store of a schema that this version knows.
+        If `store` is not an impasto store of a schema that this version knows, or the disk refuses.
     """
     problems = source_problems(store)
     if problems:
         raise StoreError(problems)
     for path in paths:
-        (store / path / "zarr.json").unlink(missing_ok=True)
+        with writing(store, f"{path}/zarr.json"):
+            (store / path / "zarr.json").unlink(missing_ok=True)
     for path in paths:
         if (store / path).exists():
-            shutil.rmtree(store / path)
+            with writing(store, path):
+                shutil.rmtree(store / path)
 
 
 def write_array_metadata(store: Path, path: str, document: Mapping[str, Any]) -> None:

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from impasto.errors import OptionError, Problem, StoreError, raise_problems
 from impasto.fit import FitOptions, fit
-from impasto.models import parse_model
+from impasto.models import parse_model, parse_models
 from impasto.psychophysics.experiment.groups import Groups
 from impasto.store import Fit, Stack, digest, fit_attributes, open_fit
 from impasto.store.borrow import borrowed_stack
@@ -124,7 +124,7 @@ def model_candidates(stacks: Mapping[str, Stack], models: Sequence[str]) -> list
     StoreError
         Listing every fit that is missing or not finished.
     """
-    names = list(dict.fromkeys(parse_model(name).name for name in models or USUAL_MODELS))
+    names = [spec.name for spec in parse_models(models or USUAL_MODELS)]
     if len(names) < 2:
         what = f"names one model, {names[0]}, and two are compared at least"
         raise OptionError(Problem("--model", what, "Name the other one too"))
