@@ -268,7 +268,7 @@ def test_arrays_of_another_shape_or_type_are_told(painting, tmp_path, name, meta
     ("name", "metadata", "what"),
     [
         ("status", {"shape": [4, 5]}, r"is uint8 of shape \(4, 5\), expected uint8 of shape"),
-        ("c", {"shape": [10**9, 10**9]}, "expected float32 of shape"),
+        ("c", {"shape": [10**9, 10**9]}, "takes .* files, expected 16,777,216 at most"),
         ("c", {"data_type": "int32"}, "is int32 of shape .* expected float32"),
         ("residual", {"data_type": "int16"}, "is int16 of shape .* expected uint16"),
         ("status", None, "lacks the map status"),
@@ -287,6 +287,30 @@ def test_maps_that_are_missing_or_of_another_kind_are_told(rich, tmp_path, name,
         document.write_text(json.dumps(json.loads(document.read_text()) | metadata))
     with pytest.raises(StoreError, match=f"fits/{MODEL}.*{what}.*--overwrite"):
         impasto.render(store, model=MODEL, light=[(30, 40)], out=tmp_path / "out", raw=True)
+
+
+@pytest.mark.parametrize("group", ["parameters", "residual"])
+def test_published_arrays_of_another_size_are_told(published, tmp_path, group):
+    store = tmp_path / "p.zarr"
+    shutil.copytree(published, store)
+    document = store / "models" / MODEL / "0" / group / "zarr.json"
+    metadata = json.loads(document.read_text())
+    metadata["shape"][1] -= 1
+    document.write_text(json.dumps(metadata))
+    with pytest.raises(StoreError, match=rf"0/{group}: is uint.* expected uint.* Publish"):
+        stores.open_published(store, MODEL)
+
+
+@pytest.mark.parametrize("axis", range(4))
+def test_kept_renderings_of_another_size_are_told(rich, tmp_path, axis):
+    store = tmp_path / "p.zarr"
+    shutil.copytree(rich, store)
+    document = store / "evaluations" / MODEL / "radiance" / "zarr.json"
+    metadata = json.loads(document.read_text())
+    metadata["shape"][axis] += 1
+    document.write_text(json.dumps(metadata))
+    with pytest.raises(StoreError, match=r"radiance: is float32 .* expected float32 .* evaluate again"):
+        stores.read_evaluation(store, MODEL).renderings()
 
 
 def test_highlights_of_another_colour_do_not_turn_white_where_their_map_is_lost(rich, tmp_path):

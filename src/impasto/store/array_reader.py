@@ -31,6 +31,9 @@ _ENCODINGS = {("bytes", "zstd"), ("bytes", "gzip"), ("vlen-utf8", "zstd"), ("vle
 # Strings are names of files; more bytes for each, on average, are damage.
 _STRING_BYTES = 1 << 16
 
+# A hundred photographs of 10 Gpx, a file per chunk, take four million; to look for more would never end.
+_MOST_FILES = 1 << 24
+
 
 @dataclass(frozen=True)
 class ArrayReader:
@@ -62,6 +65,11 @@ class ArrayReader:
         if any(length < 1 or chunk < 1 or piece % chunk for length, piece, chunk in cut):
             raise ValueError(
                 f"its shape {self.shape}, files {self._piece} and chunks {self._chunk} do not match"
+            )
+        files = math.prod(-(-length // piece) for length, piece in zip(self.shape, self._piece, strict=True))
+        if files > _MOST_FILES:
+            raise ValueError(
+                f"its shape {self.shape} takes {files:,} files, expected {_MOST_FILES:,} at most"
             )
         if missing := {"attributes", "fill_value"} - self.document.keys():
             raise ValueError(f"it has no {' and no '.join(sorted(missing))}")

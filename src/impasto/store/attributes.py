@@ -261,6 +261,6 @@ def published_kind(attributes: Attributes) -> Kind:
         )(value, name)
 
     return record(
-        {"light_rgb": numbers(None), "camera": _CAMERA, "models": each(model)},
+        {"light_rgb": numbers(None), "size": each(COUNT, 2), "camera": _CAMERA, "models": each(model)},
         {"camera_colour": or_null(_COLOUR)},
     )

@@ -16,10 +16,12 @@ from impasto.store.attributes import EVALUATION, attribute_problems
 from impasto.store.files import reading
 from impasto.store.hierarchy import (
     Attributes,
+    array_problems,
     open_array,
     provenance,
     read_group,
     remove,
+    thinned_shape,
     write_group,
     write_table,
 )
@@ -49,10 +51,13 @@ class Evaluation:
         Raises
         ------
         StoreError
-            If they are damaged.
+            If they are damaged, or not one of each held-out light at the size of the photographs.
         """
         path = f"{EVALUATIONS}/{self.attributes['model']}/{_ARRAY}"
         array = open_array(self.store, path)
+        picture = thinned_shape(self.store, self.attributes["px_per_px"]) or array.shape[1:]
+        shape = (len(self.attributes["lights"]), *picture)
+        raise_problems(StoreError, array_problems(self.store, path, array, shape, "float32", _AGAIN))
         with reading(self.store, path, _AGAIN):
             if array.lost():
                 raise ValueError("a part of the renderings is lost")

@@ -21,6 +21,7 @@ from impasto.store.chunks import encode_chunks
 from impasto.store.files import DAMAGE, reading, writing
 from impasto.store.hierarchy import (
     Attributes,
+    array_problems,
     coarser_group,
     fit_group,
     has_array,
@@ -28,6 +29,7 @@ from impasto.store.hierarchy import (
     read_group,
     remove,
     source_problems,
+    thinned_shape,
     write_array_metadata,
     write_group,
 )
@@ -37,7 +39,6 @@ from impasto.store.layout import (
     INNER_CHUNK,
     PYRAMIDS,
     RESIDUAL,
-    STACK,
     UNIT,
     ZSTD,
     Map,
@@ -403,7 +404,8 @@ def open_fit(store: str | Path, model: str, level: int = 0) -> Fit:
 def _map_problems(fit: Fit, attributes: Attributes, level: int) -> Iterator[Problem]:
     """Yield which maps are missing, of another type, or of another size than the photographs."""
     channels, term = len(attributes["light_rgb"]), attributes.get(RESIDUAL)
-    lengths = {"normal": 3, **dict.fromkeys(("diffuse", "ambient", "specular_rgb"), channels)}
+    coloured = ("diffuse", "diffuse_sd", "ambient", "ambient_sd", "specular_rgb")
+    lengths = {"normal": 3, **dict.fromkeys(coloured, channels)}
     needed = {"normal", "diffuse", "status"}
     if term is not None:
         lengths[RESIDUAL] = term["components"]
@@ -411,24 +413,12 @@ def _map_problems(fit: Fit, attributes: Attributes, level: int) -> Iterator[Prob
     chosen = attributes.get("highlight_colour", {"used": attributes["options"].get("highlight_colour")})
     if chosen["used"] == "own" and channels > 1 and "specular" in fit.names:
         needed.add("specular_rgb")
-    size = _size(fit.store, level) or fit.shape
+    size = (thinned_shape(fit.store, 2**level) or fit.shape)[:2]
     for name in sorted(needed.union(fit.names)):
         array = fit.array(name)
         shape = (*size, *([lengths[name]] if name in lengths else array.shape[2:]))
-        dtype = np.dtype({"status": "uint8", RESIDUAL: "uint16"}.get(name, "float32"))
-        if (array.shape, array.dtype) != (shape, dtype):
-            what = f"is {array.dtype} of shape {array.shape}, expected {dtype} of shape {shape}"
-            yield Problem(f"{fit.store}: {fit.group}/{name}", what, _AGAIN)
-
-
-def _size(store: Path, level: int) -> tuple[int, int] | None:
-    """Return height and width of a level by the photographs, None where the store does not have them."""
-    path = f"{STACK}/radiance"
-    shape = open_array(store, path).shape if has_array(store, path) else ()
-    if len(shape) != 4:
-        return None
-    height, width = (-(-length // 2**level) for length in shape[1:3])
-    return height, width
+        dtype = {"status": "uint8", RESIDUAL: "uint16"}.get(name, "float32")
+        yield from array_problems(fit.store, f"{fit.group}/{name}", array, shape, dtype, _AGAIN)
 
 
 def fitted_models(store: str | Path) -> list[str]:

@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from impasto.errors import Problem, StoreError
 from impasto.store.array_reader import ArrayReader
 from impasto.store.arrays import array_document
 from impasto.store.codecs import strings_encode, zstd_encode
 from impasto.store.files import is_partial, write_json, write_whole, writing
-from impasto.store.layout import FITS, PYRAMIDS, SCHEMA, ZSTD
+from impasto.store.layout import FITS, PYRAMIDS, SCHEMA, STACK, ZSTD
 
 Attributes = dict[str, Any]
 
@@ -205,6 +205,25 @@ def open_array(store: Path, path: str) -> ArrayReader:
                 do="Restore it from a copy, or run the command that made it again with --overwrite",
             )
         ) from error
+
+
+def array_problems(
+    store: Path, path: str, array: ArrayReader, shape: Sequence[int], dtype: DTypeLike, do: str
+) -> list[Problem]:
+    """Return what is wrong with an array that has another shape or type than it has to have."""
+    if (array.shape, array.dtype) == (tuple(shape), np.dtype(dtype)):
+        return []
+    what = f"is {array.dtype} of shape {array.shape}, expected {np.dtype(dtype)} of shape {tuple(shape)}"
+    return [Problem(f"{store}: {path}", what, do)]
+
+
+def thinned_shape(store: Path, step: int) -> tuple[int, ...] | None:
+    """Return height, width and channels of photographs at every `step`-th pixel, None without photographs."""
+    path = f"{STACK}/radiance"
+    shape = open_array(store, path).shape if has_array(store, path) else ()
+    if len(shape) != 4:
+        return None
+    return *(-(-length // step) for length in shape[1:3]), shape[3]
 
 
 def has_array(store: Path, path: str) -> bool:

@@ -22,7 +22,7 @@ from impasto.store.arrays import array_document
 from impasto.store.attributes import attribute_problems, published_kind
 from impasto.store.files import reading
 from impasto.store.fits import Fit, Maps
-from impasto.store.hierarchy import Attributes, open_array, read_group
+from impasto.store.hierarchy import Attributes, array_problems, open_array, read_group
 from impasto.store.layout import RESIDUAL
 from impasto.store.packing import Parameter, unpack
 
@@ -89,6 +89,17 @@ class PublishedFit(Fit):
         """Height and width in pixels."""
         height, width, _ = self._packed.shape
         return height, width
+
+    def problems(self, size: Sequence[int]) -> list[Problem]:
+        """Return what is wrong with the arrays of a painting of that height and width."""
+        packed = self._packed
+        problems = array_problems(self.store, self.group, packed, (*size, packed.shape[-1]), "uint16", _AGAIN)
+        if term := self.attributes.get(RESIDUAL):
+            shape = (*size, term["components"])
+            problems += array_problems(
+                self.store, self._residual_path, self._residual, shape, "uint8", _AGAIN
+            )
+        return problems
 
     def read(self, rows: slice, columns: slice, names: Iterable[str] | None = None) -> Maps:
         """Return maps of a tile; see `Fit.read`. The codes of a residual term are uint8."""
@@ -161,4 +172,5 @@ def open_published(store: str | Path, model: str) -> tuple[PublishedFit, Publish
         what = f"has no model {model}; it has {', '.join(models) or 'none'}"
         raise StoreError(Problem(str(store), what, "Choose one of these, or publish the painting again"))
     fit = PublishedFit(store, f"models/{model}/0/parameters", dict(models[model]))
+    raise_problems(StoreError, fit.problems(attributes["size"]))
     return fit, PublishedStack(dict(attributes), fit.shape)
