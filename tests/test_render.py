@@ -150,8 +150,9 @@ def test_what_cannot_be_rendered_is_told_before_anything_is_written(painting, tm
         impasto.render(painting, model="lambert", light=[(20, 0)], out=out)
     with pytest.raises(StoreError, match="no such store"):
         impasto.render(tmp_path / "absent.zarr", model=MODEL, light=[(20, 0)], out=out)
-    with pytest.raises(OptionError, match="exposure"):
-        impasto.render(painting, model=MODEL, light=[(20, 0)], out=out, exposure=0)
+    for exposure in (0, 1e38, float("nan")):
+        with pytest.raises(OptionError, match=r"exposure .* is not above 0, up to 1e\+09"):
+            impasto.render(painting, model=MODEL, light=[(20, 0)], out=out, exposure=exposure)
     assert not out.exists()
     out.write_text("a file")
     with pytest.raises(OutputError, match="is a file"):

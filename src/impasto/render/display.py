@@ -21,6 +21,9 @@ from impasto.store import PublishedStack, Stack
 _NAMED = {"srgb": srgb_display, "display-p3": display_p3}
 _LIGHT = "light"
 
+# What is brighter by far than any highlight over the paint around it; floats end at 3.4e38.
+_MOST_EXPOSURE = 1e9
+
 
 def requested_rendition(
     stack: Stack | PublishedStack,
@@ -52,10 +55,9 @@ def requested_rendition(
         Listing every option that cannot be used.
     """
     problems: list[Problem] = []
-    if not 0 < exposure < np.inf:
-        problems.append(
-            Problem(f"--exposure {exposure:g}", "is not above 0", "Give a factor such as 2 or 0.5")
-        )
+    if not 0 < exposure <= _MOST_EXPOSURE:
+        what = f"is not above 0, up to {_MOST_EXPOSURE:g}"
+        problems.append(Problem(f"--exposure {exposure:g}", what, "Give a factor such as 2 or 0.5"))
     for option, value, known in (
         ("--adaptation", adaptation, ADAPTATIONS),
         ("--highlights", highlights, HIGHLIGHT_RULES),
