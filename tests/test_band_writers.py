@@ -70,6 +70,14 @@ def test_an_interrupted_picture_leaves_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("name", ["x.png", "x.exr", "x.tif"])
+def test_a_picture_that_gets_no_rows_leaves_nothing_and_no_complaint(tmp_path, capfd, name):
+    with pytest.raises(KeyboardInterrupt), BandWriter(tmp_path / name, 10, 8, "RGB"):
+        raise KeyboardInterrupt
+    assert list(tmp_path.iterdir()) == []
+    assert capfd.readouterr().err == ""
+
+
 def test_a_folder_that_cannot_be_made_is_told(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="is a file"):

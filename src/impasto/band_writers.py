@@ -77,10 +77,11 @@ class BandWriter:
             spec.attribute("DateTime", "")
         self._temporary = partial_path(self.path)
         output: Any = oiio.ImageOutput.create(self.path.suffix[1:].lower())
-        self._output = output
-        if not self._output.open(str(self._temporary), spec):
-            self._temporary.unlink(missing_ok=True)
-            raise self._failed()
+        self._output, self._spec = output, spec
+        try:
+            self._temporary.touch()
+        except OSError as error:
+            raise output_error(self.path, error.strerror or str(error)) from error
 
     def write(self, band: NDArray[np.floating]) -> None:
         """Write the next rows.
@@ -98,6 +99,9 @@ class BandWriter:
         stop = self._row + band.shape[0]
         exact = self._dtype == "float"
         pixels = np.ascontiguousarray(band, np.float32) if exact else quantise(band, self._dtype)
+        # Not before there are pixels: libpng complains to the terminal about files that never get any.
+        if self._row == 0 and not self._output.open(str(self._temporary), self._spec):
+            raise self._failed()
         if not self._output.write_scanlines(self._row, stop, 0, pixels):
             raise self._failed()
         self._row = stop
