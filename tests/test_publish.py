@@ -3,6 +3,7 @@
 import gzip
 import http.client
 import json
+import shutil
 import threading
 
 import numpy as np
@@ -13,9 +14,11 @@ from tests.store_files import contents
 
 import impasto
 from impasto.errors import OptionError, OutputError, StoreError
+from impasto.fit import FitOptions
 from impasto.fit.light_process import hull_of
 from impasto.geometry import dome_direction
 from impasto.maps.integration import integrate_normals
+from impasto.publish.publication import Publication
 from impasto.publish.residual import PackedResidual
 from impasto.residual import ZERO, ResidualTerm
 from impasto.store import open_fit, open_published
@@ -165,6 +168,21 @@ def test_photographs_are_published_with_their_lights(painting, site):
         codes = root["photographs/0"][index].astype(float)
         got = np.where(codes == 1, 0, 2 ** (kept["offset"] + kept["scale"] * codes))
         np.testing.assert_allclose(got, radiance, rtol=2.2e-4, atol=1e-6)
+
+
+def test_photographs_are_published_as_strong_as_a_fit_found_them(painting, tmp_path):
+    """By the first of the models that looked for it; the others are as stated."""
+    store = tmp_path / "p.zarr"
+    shutil.copytree(painting, store)
+    stated = Publication(store).attributes["photographs"]["lights"]
+    shutil.rmtree(store / "fits" / "phong")
+    impasto.fit(store, models=["phong"], options=FitOptions(self_calibrate=True))
+    found = open_fit(store, "phong").attributes["self_calibration"]
+    published = Publication(store).attributes["photographs"]["lights"]
+    strength = np.array(found["gain"]) / found["trend"]
+    assert np.abs(strength - 1).max() > 1e-3
+    for before, light, factor in zip(stated, published, strength, strict=True):
+        assert light["intensity"] == pytest.approx(before["intensity"] * factor)
 
 
 def test_the_relief_of_normals_is_that_of_the_surface():

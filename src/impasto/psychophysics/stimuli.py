@@ -17,7 +17,7 @@ from impasto.colour import quantise
 from impasto.colour.rendition import Rendition
 from impasto.errors import OptionError, Problem
 from impasto.images import write_png
-from impasto.light_strength import scale_lights
+from impasto.light_strength import scale_photographed
 from impasto.render import render_bands
 from impasto.store import Fit, Stack
 
@@ -145,18 +145,18 @@ def photographs(stack: Stack, view: View, lights: Sequence[int]) -> Iterator[NDA
 def renderings(fit: Fit, stack: Stack, view: View, lights: Sequence[int]) -> Iterator[NDArray[np.float32]]:
     """Yield what a fit shows under the lights of photographs; see `photographs`.
 
-    Where the fit tells how strong the lamp was around a light, renderings follow it.
+    Lights are as strong as the fit found them.
 
     Raises
     ------
     StoreError
         If the fit is damaged.
     """
+    found = scale_photographed(fit.attributes, stack.lights)
     for start in range(0, len(lights), _LIGHTS_AT_A_TIME):
         group = list(lights[start : start + _LIGHTS_AT_A_TIME])
         reduced = _Reduced(len(group), view, stack.shape[3])
-        under = scale_lights(fit.attributes, stack.lights.select(group))
-        for band in render_bands(fit, under, stack.camera):
+        for band in render_bands(fit, found.select(group), stack.camera):
             reduced.add(band.rows, band.radiance)
         yield from reduced.result()
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.fit.pyramid import halve
+from impasto.geometry import Lights
 from impasto.publish.arrays import Codes, PackedArray, pixels_of
 from impasto.store import Stack, level_sizes
 from impasto.store.packing import logarithmic
@@ -32,12 +33,16 @@ def spread(direction: NDArray[np.float64], count: int | None) -> list[int]:
     return sorted(chosen)
 
 
-def photograph_arrays(stack: Stack, kept: list[int]) -> tuple[dict[str, PackedArray], dict[str, Any] | None]:
+def photograph_arrays(
+    stack: Stack, lights: Lights, kept: list[int]
+) -> tuple[dict[str, PackedArray], dict[str, Any] | None]:
     """Return the arrays of some photographs, by their path, and the attribute that describes them.
 
     Parameters
     ----------
     stack : Stack
+    lights : Lights
+        Of the stack, as strong as they were.
     kept : list of int
         Which photographs.
     """
@@ -61,7 +66,6 @@ def photograph_arrays(stack: Stack, kept: list[int]) -> tuple[dict[str, PackedAr
             1,
             read,
         )
-    lights = stack.lights
     intensity = np.broadcast_to(lights.intensity, (len(lights), channels))
     near = [bool(np.isfinite(place).all()) for place in lights.position_mm]
     clip = [None if not np.isfinite(level) else level for level in stack.clip_level.tolist()]

@@ -23,7 +23,9 @@ from impasto.errors import OptionError, Problem
 from impasto.evaluate.gloss import PixelGloss
 from impasto.evaluate.glossmeter import GLOSSMETERS
 from impasto.fit.pyramid import halve
+from impasto.geometry import Lights
 from impasto.light_distance import only_told
+from impasto.light_strength import scale_photographed
 from impasto.maps.integration import integrate_normals
 from impasto.models import MODELS, parse_model, parse_models
 from impasto.publish.arrays import Codes, PackedArray, pixels_of
@@ -33,6 +35,7 @@ from impasto.store import (
     RESIDUAL,
     Fit,
     Stack,
+    fit_attributes,
     fitted_models,
     level_sizes,
     open_fit,
@@ -115,7 +118,8 @@ class Publication:
         self.levels = 1 + len(level_sizes(*self.size))
         self.arrays: dict[str, PackedArray] = {}
         entries = [self._add_model(name) for name in names]
-        pictures, kept = photograph_arrays(stack, spread(stack.lights.direction, photographs))
+        kept = spread(stack.lights.direction, photographs)
+        pictures, described = photograph_arrays(stack, _strong(stack, names), kept)
         self.arrays.update(pictures)
         self.attributes: dict[str, Any] = {
             **provenance(),
@@ -130,7 +134,7 @@ class Publication:
             "display": _display(stack),
             "quantisation": QUANTISATION,
             "models": entries,
-            "photographs": kept,
+            "photographs": described,
             "height": self._add_height(names[0]),
         }
 
@@ -273,6 +277,15 @@ def _tile(number: tuple[int, ...], size: tuple[int, ...]) -> tuple[slice, slice]
     """Return the rows and columns of a chunk of maps."""
     rows, columns = (pixels_of(*each, PUBLISHED_CHUNK) for each in zip(number[:2], size[:2], strict=True))
     return rows, columns
+
+
+def _strong(stack: Stack, models: Sequence[str]) -> Lights:
+    """Return the lights of a stack as strong as the first of its fits that looked for that found them."""
+    for model in models:
+        attributes = fit_attributes(stack.store, model) or {}
+        if "self_calibration" in attributes:
+            return scale_photographed(attributes, stack.lights)
+    return stack.lights
 
 
 def _by_usefulness(names: list[str]) -> list[str]:
