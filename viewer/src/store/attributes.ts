@@ -111,6 +111,7 @@ export function checked(given: unknown, where: string): Attributes {
     throw bad("levels");
   const channels = attributes.light_rgb?.length;
   if (channels !== 1 && channels !== 3) throw bad("light_rgb");
+  if (!isCamera(attributes.camera)) throw bad("camera");
   const rows = attributes.display?.matrix;
   if (!Array.isArray(rows) || rows.length !== 3 || !rows.every((row) => row.every(Number.isFinite))) {
     throw bad("display.matrix");
@@ -124,6 +125,8 @@ export function checked(given: unknown, where: string): Attributes {
     if (Math.max(entry.parameters.length, entry.quality.length) > MAX_COLUMNS || entry.lobes > MAX_LOBES) {
       throw new StoreProblem("unsupported", where, entry.name);
     }
+    const surface = entry.index_of_refraction > 0 && ["facet", "element"].includes(entry.fresnel);
+    if (!surface || !numbers(entry.light_rgb, channels)) throw bad(`models: ${entry.name}`);
     if (entry.residual && !isWhole(entry.residual, channels)) throw bad(`models: ${entry.name}: residual`);
     const told = entry.self_calibration?.distances?.told;
     if (told && !isToldDistance(told)) throw bad(`models: ${entry.name}: self_calibration`);
@@ -142,6 +145,12 @@ function drawable(entry: ModelEntry): boolean {
 const numbers = (list: unknown, count: number) =>
   Array.isArray(list) && list.length === count && list.every(Number.isFinite);
 const vectors = (list: unknown) => Array.isArray(list) && list.every((each) => numbers(each, 3));
+
+/** Whether it says where the camera stands; lengths are null where they are not known. */
+function isCamera(camera: Attributes["camera"] | undefined): boolean {
+  const lengths = [camera?.distance_mm, camera?.mm_per_px];
+  return numbers(camera?.view_direction, 3) && lengths.every((length) => length === null || length! > 0);
+}
 
 /** Whether what so many lights tell has all its numbers. */
 function isTold({ table, weights, length }: Told, lights: number): boolean {
