@@ -249,8 +249,9 @@ def test_attributes_that_are_no_object_are_told(painting, tmp_path):
 @pytest.mark.parametrize(
     ("name", "metadata", "what"),
     [
-        ("light_direction", {"shape": [16, 2]}, r"expected numbers of shape \(16, 3\)"),
-        ("light_intensity", {"data_type": "string"}, r"expected numbers of shape \(16, 3\)"),
+        ("light_direction", {"shape": [16, 2]}, r"expected float64 of shape \(16, 3\)"),
+        ("light_direction", {"data_type": "int64"}, r"is int64 .* expected float64 of shape \(16, 3\)"),
+        ("light_intensity", {"data_type": "string"}, r"expected float64 of shape \(16, 3\)"),
         ("light_name", {"shape": [15]}, r"expected strings of shape \(16,\)"),
         ("radiance", {"data_type": "int8"}, "expected uint16 or float32"),
     ],

@@ -51,9 +51,10 @@ class Stack:
         # What is not known is NaN for every light, and Zarr need not write that.
         path = f"{STACK}/{name}"
         array = open_array(self.store, path)
-        shape, values = (self.shape[0], *axes), "strings" if name == "light_name" else "numbers"
-        if array.shape != shape or (array.dtype == object) != (values == "strings"):
-            what = f"is {array.dtype} of shape {array.shape}, expected {values} of shape {shape}"
+        shape, dtype = (self.shape[0], *axes), np.dtype(object if name == "light_name" else np.float64)
+        if (array.shape, array.dtype) != (shape, dtype):
+            expected = "strings" if dtype.hasobject else dtype
+            what = f"is {array.dtype} of shape {array.shape}, expected {expected} of shape {shape}"
             raise StoreError(Problem(f"{self.store}: {path}", what, _AGAIN))
         if known and array.lost():
             raise StoreError(Problem(f"{self.store}: {path}", "has lost its values", _AGAIN))
