@@ -314,6 +314,35 @@ def test_kept_renderings_of_another_size_are_told(rich, tmp_path, axis):
         stores.read_evaluation(store, MODEL).renderings()
 
 
+@pytest.mark.parametrize(
+    "strength",
+    [
+        {"table": [[[0.0, 0.1]]] * 2},
+        {"table": [[[], []]] * 3},
+        {"weights": [[0.1] * 15] * 3, "length": 0.3},
+        {"weights": [[0.1] * 16] * 2, "length": 0.3},
+    ],
+)
+def test_strengths_of_other_channels_or_lights_are_told(rich, tmp_path, strength):
+    store = tmp_path / "p.zarr"
+    shutil.copytree(rich, store)
+    group = store / "fits" / MODEL
+    change_attributes(group, lambda found: found["residual"].update(strength=strength))
+    with pytest.raises(StoreError, match=r"the attribute residual\.strength\.(table|weights) is"):
+        stores.open_fit(store, MODEL)
+
+
+def test_a_distance_told_by_weights_of_other_lights_is_told(rich, tmp_path):
+    store = tmp_path / "p.zarr"
+    shutil.copytree(rich, store)
+    told = {"distance": 2.0, "weights": [[0.1] * 16], "length": 0.3, "direction": [[0, 0, 1]] * 15}
+    change_attributes(
+        store / "fits" / MODEL, lambda found: found["self_calibration"]["distances"].update(told=told)
+    )
+    with pytest.raises(StoreError, match=r"distances\.told\.weights is .* expected a list of 1 x 15"):
+        stores.open_fit(store, MODEL)
+
+
 def test_highlights_of_another_colour_do_not_turn_white_where_their_map_is_lost(rich, tmp_path):
     store = tmp_path / "p.zarr"
     shutil.copytree(rich, store)

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from impasto.errors import Problem
 from impasto.store.hierarchy import Attributes
 from impasto.store.kinds import (
@@ -108,7 +110,7 @@ def fit_kind(model: str, attributes: Attributes, channels: int | None) -> Kind:
             "notes": each(TEXT),
             "self_calibration": _self_calibration(lights, channels),
             "highlight_colour": record({"used": one_of("white", "own")}),
-            "residual": _residual,
+            "residual": _residual(channels),
             "sample": _SAMPLE,
             "complete": FLAG,
         },
@@ -138,17 +140,26 @@ _OPTIONS = record(
 _SAMPLE = record({"arm_azimuth_deg": NUMBER, "threshold_deg": NUMBER, "row": COUNT, "column": COUNT})
 
 
-def _over_direction(value: Any, name: str) -> Iterator[str]:
-    """Check what is told over direction: by a table or, in older stores, by the weights of a kernel."""
-    if isinstance(value, dict) and "weights" in value:
-        return record({"weights": numbers(None, None), "length": POSITIVE})(value, name)
-    return record({"table": numbers(None, None, None)})(value, name)
+def _over_direction(channels: int | None, lights: int | None) -> Kind:
+    """Return what is told over direction: by a table or, in older stores, by the weights of a kernel."""
+
+    def check(value: Any, name: str) -> Iterator[str]:
+        if isinstance(value, dict) and "weights" in value:
+            return record({"weights": numbers(channels, lights), "length": POSITIVE})(value, name)
+        wrong = list(record({"table": numbers(channels, None, None)})(value, name))
+        if not wrong and not np.size(value["table"]):
+            wrong.append(f"the attribute {name}.table is empty, expected directions in every channel")
+        return iter(wrong)
+
+    return check
 
 
 def _told(value: Any, name: str) -> Iterator[str]:
-    yield from record({"distance": POSITIVE})(value, name)
+    yield from record({"distance": POSITIVE}, {"direction": numbers(None, 3)})(value, name)
     if isinstance(value, dict) and {"table", "weights"} & value.keys():
-        yield from _over_direction(value, name)
+        direction = value.get("direction")
+        lights = len(direction) if isinstance(direction, list) else 0
+        yield from _over_direction(1, lights)(value, name)
 
 
 def _self_calibration(lights: int | None, channels: int | None) -> Kind:
@@ -168,26 +179,30 @@ def _self_calibration(lights: int | None, channels: int | None) -> Kind:
     return record({"gain": strengths, "trend": strengths}, {"directions": directions, "distances": distances})
 
 
-def _residual(value: Any, name: str) -> Iterator[str]:
-    """Check a residual term, whose parts have to match."""
-    found = value if isinstance(value, dict) else {}
-    components = _count(found, "components")
-    lights = len(found["direction"]) if isinstance(found.get("direction"), list) else None
-    # A published store has what each of 256 codes stands for.
-    values = {"table": numbers(256)} if "table" in found else {"step": numbers(components)}
-    return record(
-        {
-            "components": COUNT,
-            **values,
-            "toe": POSITIVE,
-            "direction": numbers(lights, 3),
-            "length": POSITIVE,
-            "weights": numbers(components, None, lights),
-            "hull": numbers(None, 3),
-            "fade": POSITIVE,
-        },
-        {"zero": COUNT, "strength": or_null(_over_direction)},
-    )(value, name)
+def _residual(channels: int | None) -> Kind:
+    """Return what a residual term is, whose parts have to match."""
+
+    def check(value: Any, name: str) -> Iterator[str]:
+        found = value if isinstance(value, dict) else {}
+        components = _count(found, "components")
+        lights = len(found["direction"]) if isinstance(found.get("direction"), list) else None
+        # A published store has what each of 256 codes stands for.
+        values = {"table": numbers(256)} if "table" in found else {"step": numbers(components)}
+        return record(
+            {
+                "components": COUNT,
+                **values,
+                "toe": POSITIVE,
+                "direction": numbers(lights, 3),
+                "length": POSITIVE,
+                "weights": numbers(components, channels, lights),
+                "hull": numbers(None, 3),
+                "fade": POSITIVE,
+            },
+            {"zero": COUNT, "strength": or_null(_over_direction(channels, lights))},
+        )(value, name)
+
+    return check
 
 
 _OR_UNKNOWN = or_null(NUMBER)
@@ -254,7 +269,7 @@ def published_kind(attributes: Attributes) -> Kind:
                 "parameters": columns,
             },
             {
-                "residual": or_null(_residual),
+                "residual": or_null(_residual(channels)),
                 "self_calibration": record({}, {"distances": record({}, {"told": _told})}),
                 "sample": _SAMPLE,
             },
