@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from impasto.fit.robust import cauchy_weight
 from impasto.geometry import Array, Lights, zenith_azimuth
 from impasto.residual import kernel
 
@@ -275,6 +276,6 @@ def _weights(error: Array, precisions: Sequence[Array], factor: Array) -> tuple[
         whitened = (precision @ part[:, :, None])[:, :, 0]
         departures.append(whitened / np.sqrt(np.diagonal(precision, axis1=1, axis2=2)))
         squares.append((whitened * part).sum(axis=1))
-    weight: Array = 1.0 / (1.0 + np.square(np.concatenate(departures).T / 2.0))
+    weight = cauchy_weight(np.concatenate(departures).T, 2.0)
     free = len(error) - _OWN
     return weight, np.maximum(factor * np.concatenate(squares) / free, _LEAST_FACTOR)

@@ -11,7 +11,8 @@ from impasto.geometry import Array, dome_direction
 from impasto.residual import kernel
 
 _LENGTHS = 0.1 * 2.0 ** (np.arange(9) / 2)
-_NOISES = 10.0 ** np.arange(-2.0, 0.51, 0.5)
+NOISES = 10.0 ** np.arange(-2.0, 0.51, 0.5)
+"""Variances of the noise, over that of a process, that are tried: from a hundredth to three."""
 
 # Beyond the outermost lights the term fades over 10 degrees: about the distance between the lights of a dome.
 FADE_DEG = 10.0
@@ -83,7 +84,7 @@ def choose_process(direction: Array, moments: Array) -> LightProcess:
 
 def usual_processes(direction: Array) -> list[LightProcess]:
     """Return the processes that are tried: lengths from 0.1 to 1.6, noise from a hundredth to three times."""
-    return [LightProcess(direction, length, noise) for length in _LENGTHS for noise in _NOISES]
+    return [LightProcess(direction, length, noise) for length in _LENGTHS for noise in NOISES]
 
 
 @dataclass(frozen=True)

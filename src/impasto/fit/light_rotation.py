@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impasto.fit.robust import cauchy_scale, cauchy_weight, robust_fit
-from impasto.geometry import Array, Lights
+from impasto.geometry import Array, Lights, turn_about_z
 
 # Lights nearer the normal show highlights, which least squares take for slopes: on simulated paintings they
 # rotated lights that were stated right by 0.2°.
@@ -73,9 +73,11 @@ def find_rotation(crosses: NDArray[np.floating], lights: Lights, error_deg: floa
 
 def rotated(lights: Lights, angle: float) -> Lights:
     """Return lights rotated about Z by an angle in radians, from X towards Y."""
-    cosine, sine = np.cos(angle), np.sin(angle)
-    turn = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    return replace(lights, direction=lights.direction @ turn, position_mm=lights.position_mm @ turn)
+    return replace(
+        lights,
+        direction=turn_about_z(lights.direction, angle),
+        position_mm=turn_about_z(lights.position_mm, angle),
+    )
 
 
 def _slopes(radiance: Array, direction: Array) -> Array:
@@ -91,8 +93,7 @@ def _slopes(radiance: Array, direction: Array) -> Array:
         matrix = (weight.T @ squares).reshape(-1, 3, 3) + 1e-9 * np.eye(3)
         scaled = np.linalg.solve(matrix, ((weight * values).T @ direction)[:, :, None])[:, :, 0].T
         rest = values - direction @ scaled
-        scale = 2.0 * 1.4826 * np.median(np.abs(rest), axis=0) + 1e-9
-        weight = known * cauchy_weight(rest / scale, 1.0)
+        weight = known * cauchy_weight(rest, cauchy_scale(rest))
     told = scaled[2] > np.hypot(scaled[0], scaled[1]) / _STEEPEST
     told &= known.sum(axis=0) >= _LEAST_LIGHTS
     return np.where(told, -scaled[:2] / np.where(told, scaled[2], 1.0), np.nan)

@@ -5,27 +5,32 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from impasto.geometry import Array
 
 _ROUNDS = 10
 
 
-def cauchy_scale(rest: Array) -> float:
+def cauchy_scale(rest: Array) -> Array:
     """Return the size of a residual at which its weight is one half: two standard deviations.
 
     Parameters
     ----------
-    rest : ndarray of shape (N,)
-        Their median size tells the standard deviation as of normal errors.
+    rest : ndarray of shape (N, ...)
+        The median size along the first axis tells the standard deviation as of normal errors.
+
+    Returns
+    -------
+    ndarray of shape (...)
     """
-    return float(2.0 * 1.4826 * np.median(np.abs(rest)) + 1e-9)
+    result: Array = 2.0 * 1.4826 * np.median(np.abs(rest), axis=0) + 1e-9
+    return result
 
 
-def cauchy_weight(rest: Array, scale: float) -> Array:
-    """Return the weights 1 / (1 + (r / s)²) of residuals r (N,) at a scale s."""
-    result: Array = 1.0 / (1.0 + np.square(rest / scale))
+def cauchy_weight(rest: Array, scale: ArrayLike) -> Array:
+    """Return the weights 1 / (1 + (r / s)²) of residuals r (N, ...) at a scale s of shape (...)."""
+    result: Array = 1.0 / (1.0 + np.square(rest / np.asarray(scale)))
     return result
 
 

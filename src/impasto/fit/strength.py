@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from impasto.direction_table import node_directions
-from impasto.fit.light_process import left_out
+from impasto.fit.light_process import NOISES, left_out
 from impasto.geometry import Array
 
 TELLING = 0.85
@@ -17,7 +17,6 @@ TELLING = 0.85
 have nothing to do with direction, chance lowers it by a few per cent."""
 
 _LENGTHS = (0.3, 0.6, 1.2, 2.4, 4.8)
-_NOISES = 10.0 ** np.arange(-2.0, 0.51, 0.5)
 
 # Radians: narrower than the 20 to 45 degrees between the strokes in which a lamp is led around a painting.
 _AZIMUTH = 0.3
@@ -78,7 +77,7 @@ def find_strength(direction: Array, departure: Array) -> dict[str, Any] | None:
     """
     moments = departure @ departure.T / departure.shape[1]
     kernels = [HandKernel(*each) for each in product(_LENGTHS, (False, True), (False, True))]
-    processes = [(kernel, noise) for kernel in kernels for noise in _NOISES]
+    processes = [(kernel, noise) for kernel in kernels for noise in NOISES]
     noisy = [kernel(direction, direction) + noise * np.eye(len(direction)) for kernel, noise in processes]
     # Mean absolute errors: one number per light is too few for a geometric mean, which lucky ones rule.
     errors = [np.sqrt(left_out(gram, moments)).mean() for gram in noisy]

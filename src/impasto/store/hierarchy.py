@@ -211,10 +211,11 @@ def array_problems(
     store: Path, path: str, array: ArrayReader, shape: Sequence[int], dtype: DTypeLike, do: str
 ) -> list[Problem]:
     """Return what is wrong with an array that has another shape or type than it has to have."""
-    if (array.shape, array.dtype) == (tuple(shape), np.dtype(dtype)):
+    found, expected = (array.shape, array.dtype), (tuple(shape), np.dtype(dtype))
+    if found == expected:
         return []
-    what = f"is {array.dtype} of shape {array.shape}, expected {np.dtype(dtype)} of shape {tuple(shape)}"
-    return [Problem(f"{store}: {path}", what, do)]
+    words = [f"{'strings' if kind.hasobject else kind} of shape {size}" for size, kind in (found, expected)]
+    return [Problem(f"{store}: {path}", f"is {words[0]}, expected {words[1]}", do)]
 
 
 def thinned_shape(store: Path, step: int) -> tuple[int, ...] | None:

@@ -18,6 +18,7 @@ from impasto.store.attributes import attribute_problems, stack_kind
 from impasto.store.files import DAMAGE, digest, reading
 from impasto.store.hierarchy import (
     Attributes,
+    array_problems,
     has_array,
     open_array,
     read_group,
@@ -51,11 +52,8 @@ class Stack:
         # What is not known is NaN for every light, and Zarr need not write that.
         path = f"{STACK}/{name}"
         array = open_array(self.store, path)
-        shape, dtype = (self.shape[0], *axes), np.dtype(object if name == "light_name" else np.float64)
-        if (array.shape, array.dtype) != (shape, dtype):
-            expected = "strings" if dtype.hasobject else dtype
-            what = f"is {array.dtype} of shape {array.shape}, expected {expected} of shape {shape}"
-            raise StoreError(Problem(f"{self.store}: {path}", what, _AGAIN))
+        shape, dtype = (self.shape[0], *axes), object if name == "light_name" else np.float64
+        raise_problems(StoreError, array_problems(self.store, path, array, shape, dtype, _AGAIN))
         if known and array.lost():
             raise StoreError(Problem(f"{self.store}: {path}", "has lost its values", _AGAIN))
         with reading(self.store, path, _AGAIN):

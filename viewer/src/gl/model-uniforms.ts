@@ -3,7 +3,7 @@
 import type { Attributes, GlossTable, ModelEntry, ResidualTerm } from "../store/attributes";
 import { placeLights } from "./light-distance";
 import { floatTexture, type Program } from "./program";
-import { residualBasis } from "./residual";
+import { residualBasis, rgb } from "./residual";
 import type { Scene, ShaderLight } from "./scene";
 
 const GLOSS_ANGLE = 60;
@@ -118,8 +118,4 @@ export class ModelUniforms {
     gl.bindTexture(gl.TEXTURE_2D, basis.texture);
     program.float("toe", term.toe);
   }
-}
-
-function rgb(values: readonly number[]): [number, number, number] {
-  return values.length === 3 ? (values as [number, number, number]) : [values[0]!, values[0]!, values[0]!];
 }

@@ -10,16 +10,16 @@ function share(term: ResidualTerm, direction: readonly number[]): number {
   return 1 - part * part * (3 - 2 * part);
 }
 
-const threeChannels = (values: readonly number[]) =>
-  values.length === 3 ? [...values] : [values[0]!, values[0]!, values[0]!];
+/** Returns values of one or three channels as those of three. */
+export function rgb(values: readonly number[]): [number, number, number] {
+  return values.length === 3 ? (values as [number, number, number]) : [values[0]!, values[0]!, values[0]!];
+}
 
 /** Returns the functions of a light's direction, with their fading: three channels for each component. */
 export function residualBasis(term: ResidualTerm, direction: readonly number[]): number[][] {
   const left = share(term, direction);
   return term.weights.map((channels) =>
-    threeChannels(
-      channels.map((weights) => left * kernelSum(weights, term.direction, term.length, direction)),
-    ),
+    rgb(channels.map((weights) => left * kernelSum(weights, term.direction, term.length, direction))),
   );
 }
 

@@ -1,6 +1,7 @@
 /** From what a person has chosen to what is drawn of a store. */
 
 import type { Content, Range, Scene, View } from "../gl/scene";
+import { dot } from "../gl/told";
 import type { ModelEntry } from "../store/attributes";
 import { asProblem, type StoreProblem } from "../store/errors";
 import type { PublishedStore } from "../store/published";
@@ -120,9 +121,7 @@ export class Scenes {
   /** The photograph whose light stands nearest to the chosen one, and how far away. */
   nearest({ lights, active }: State): { index: number; angle_deg: number } {
     const chosen = direction(lights[active]!.zenith, lights[active]!.azimuth);
-    const cosines = this.store.attributes.photographs!.lights.map((light) =>
-      light.direction.reduce((sum, value, i) => sum + value * chosen[i]!, 0),
-    );
+    const cosines = this.store.attributes.photographs!.lights.map((light) => dot(light.direction, chosen));
     const index = cosines.indexOf(Math.max(...cosines));
     return { index, angle_deg: (Math.acos(clamp(cosines[index]!, -1, 1)) * 180) / Math.PI };
   }

@@ -15,7 +15,7 @@ from impasto.report.subject import Subject, drawn
 from impasto.store import Evaluation, Fit, read_evaluation
 
 _SHOWN_LIGHTS = 3
-AS_PHOTOGRAPHED = "mean, as photographed"
+_AS_PHOTOGRAPHED = "mean, as photographed"
 
 
 def section(subject: Subject) -> Section:
@@ -43,7 +43,7 @@ def section(subject: Subject) -> Section:
     if any(each.attributes.get("as_photographed") for each in current.values()):
         page.text(
             "Renderings are under lights as strong as stated, so by how much the lamp of a photograph was "
-            f"stronger or weaker counts as error. “{AS_PHOTOGRAPHED}” is the mean where renderings follow "
+            f"stronger or weaker counts as error. “{_AS_PHOTOGRAPHED}” is the mean where renderings follow "
             "the strengths that the other photographs tell."
         )
     for model, each in current.items():
@@ -80,7 +80,7 @@ def _rows(evaluation: Evaluation) -> list[tuple[str, ...]]:
     lights = found["lights"]
     rows = [(entry["name"], f"{entry['zenith_deg']:.1f}°", *cells(entry["errors"])) for entry in lights]
     if found.get("as_photographed"):
-        rows.append((AS_PHOTOGRAPHED, "", *cells(found["as_photographed"])))
+        rows.append((_AS_PHOTOGRAPHED, "", *cells(found["as_photographed"])))
     return [*rows, ("mean", "", *cells(found["mean"]))]
 
 
